@@ -416,6 +416,16 @@ impl Bsdf<'_> {
         Lanes::new(std::array::from_fn(share))
     }
 
+    /// η² of each lane over the hero's, by which a sample from `wo` is worth more as power where it `crosses` into another medium.
+    #[must_use]
+    #[inline]
+    pub fn power_of_lanes(&self, wo: DVec3, crosses: bool) -> Lanes {
+        match self {
+            Bsdf::RoughDielectric(glass) if crosses => glass.power_of_lanes(wo),
+            _ => Lanes::ONE,
+        }
+    }
+
     /// A direction for the path to go on in; `None` ends it. `u_lobe` chooses among lobes.
     #[must_use]
     pub fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {

@@ -322,6 +322,14 @@ pub struct RoughDielectric {
 }
 
 impl RoughDielectric {
+    /// η² of each lane over the hero's where light from `wo` crosses: of what goes on as power [`BsdfSample::eta2`] is the hero's, while
+    /// the radiance of each lane has scaled by its own.
+    pub(super) fn power_of_lanes(&self, wo: DVec3) -> Lanes {
+        let toward = |eta: f64| if wo.z > 0.0 { eta } else { 1.0 / eta };
+        let hero = toward(self.eta.hero());
+        self.eta.lanes(|eta| (toward(eta) / hero).powi(2))
+    }
+
     pub(super) fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
         if wo.z == 0.0 {
             return None;
@@ -465,5 +473,44 @@ fn by_facet(facets: &Microfacets, wo: DVec3, wi: DVec3, m: DVec3, split: &Split,
         let root = cos_o + eta * cos_i;
         let jacobian = cos_i.abs() / (root * root);
         (split.transmitted * flow * cos_o * jacobian, split.transmitted * pdf * eta * eta * jacobian)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampler::uniform;
+    use crate::optics::bsdf::{Bsdf, Chosen};
+    use crate::optics::microfacet::{Distribution, Microfacets};
+
+    /// What goes through ground flint as power is what the way back lets through as radiance, at each wavelength: f(i, o) = (η_i/η_o)² f(o, i)
+    /// (Veach 1997, eq. 5.14).
+    #[test]
+    fn power_through_ground_flint_is_radiance_the_other_way() {
+        let eta = RelativeIndex::Dispersive(std::array::from_fn(|k| 1.5 + 0.05 * k as f64));
+        let facets = Microfacets::isotropic(Distribution::Ggx, 0.3);
+        let tint = Tint { reflected: Lanes::ONE, transmitted: Lanes::ONE };
+        let bsdf = Bsdf::RoughDielectric(RoughDielectric { facets, eta, tint, film: None });
+        let mut crossed = 0;
+        for i in 0..200u64 {
+            let u = |k: u64| uniform(5, 8 * i + k);
+            let wo = crate::math::warp::uniform_sphere(DVec2::new(u(0), u(1)));
+            let Some(sample) = bsdf.sample(wo, u(2), DVec2::new(u(3), u(4))) else { continue };
+            let Chosen::Density(pdf) = sample.chosen else { panic!("a density") };
+            if !sample.transmitted {
+                continue;
+            }
+            crossed += 1;
+            let power = sample.weight * bsdf.power_of_lanes(wo, true) * sample.eta2 as f32;
+            let back = bsdf.eval(sample.wi, wo).f * (sample.wi.z.abs() / pdf) as f32;
+            for (found, expected) in power.to_array().into_iter().zip(back.to_array()) {
+                assert!(
+                    (found - expected).abs() <= 1e-4 * expected + 1e-12,
+                    "{wo} {:?}: {found} for {expected}",
+                    sample.wi
+                );
+            }
+        }
+        assert!(crossed > 50, "{crossed}");
     }
 }

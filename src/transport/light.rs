@@ -486,14 +486,18 @@ impl<'a> Walk<'a, '_> {
         u_lobe: f64,
         u_scatter: DVec2,
     ) -> Option<(BsdfSample, View)> {
+        let sent = |view: &View| {
+            let wo = view.frame.to_local(at.came);
+            let sample = bsdf.sample(wo, u_lobe, u_scatter)?;
+            Some(BsdfSample { weight: sample.weight * bsdf.power_of_lanes(wo, sample.transmitted), ..sample })
+        };
         if at.is_plain() {
-            let sample = bsdf.sample(view.frame.to_local(at.came), u_lobe, u_scatter)?;
-            return Some((sample, *view));
+            return Some((sent(view)?, *view));
         }
         let mut found = None;
         let (mut count, mut u) = (0u8, self.sampler.set(Walk::set_of_flight(vertex, 0))[3]);
         for view in at.views(view, bsdf) {
-            let Some(sample) = bsdf.sample(view.frame.to_local(at.came), u_lobe, u_scatter) else { continue };
+            let Some(sample) = sent(&view) else { continue };
             if at.is_seen_so(&view, view.frame.to_world(sample.wi)) {
                 // Of n each is kept with probability 1/n.
                 count += 1;
@@ -573,18 +577,24 @@ impl<'a> Walk<'a, '_> {
         let (point, came, normal) = (surface.point, -beam.ray.direction.as_vec3(), surface.normal.as_vec3());
         let (vertices, group) = (beam.vertex, self.group);
         let power = beam.power * (self.unit_area / photons.unit_area) as f32;
+        // It is collected as light of the shared wavelengths, and is weighed by their density: near a line another one than its own.
+        let cell = self.paths.wavelength.filter(|cell| cell.width > 0.0);
+        let shared = cell.map(|cell| self.paths.scene.wavelengths.sample(cell.shared).inv_pdf);
+        let weight = shared.map_or(Lanes::ONE, |shared| self.wavelengths.inv_pdf / shared);
         match beam.alone {
             None => {
-                let light = Together { power, rho: beam.rho };
+                let light = Together { power: power * weight, rho: beam.rho };
                 photons.together.push(Photon { point, came, normal, light, vertices, group });
             }
             // What led to where it parted counts beside what leads a path from the camera here.
             Some(_) if beam.led.simd_ne(Lanes::ONE).any() => {
-                let light = Together { power: beam.only(power * beam.led.reduce_add() / LANES as f32), rho: beam.led };
+                let power = beam.only(power * beam.led.reduce_add() / LANES as f32) * weight;
+                let light = Together { power, rho: beam.led };
                 photons.together.push(Photon { point, came, normal, light, vertices, group });
             }
             Some(lane) => {
-                let power = power.to_array()[0] * (LANES as f32 / beam.rho.reduce_add());
+                let weight = weight.to_array()[lane] * LANES as f32 / beam.rho.reduce_add();
+                let power = power.to_array()[0] * weight;
                 let light = Alone { power, lane: lane as u8 };
                 photons.alone.push(Photon { point, came, normal, light, vertices, group });
             }

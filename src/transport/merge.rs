@@ -49,6 +49,8 @@ pub fn shared_moment(seed: u64, replicate: u32, index: u32, moments: usize) -> u
 /// The numbers in [0, 1) that choose wavelengths near to shared ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WavelengthCell {
+    /// The one that is shared.
+    pub shared: f64,
     /// The first of them.
     pub start: f64,
     /// How far they go.
@@ -62,7 +64,7 @@ impl WavelengthCell {
     /// The one number `u`.
     #[must_use]
     pub fn point(u: f64) -> WavelengthCell {
-        WavelengthCell { start: u, width: 0.0 }
+        WavelengthCell { shared: u, start: u, width: 0.0 }
     }
 
     /// The cell that holds `u`, of as many as the largest power of two among the samples of a replicate in each eighth
@@ -70,7 +72,7 @@ impl WavelengthCell {
     #[must_use]
     pub fn around(u: f64, samples: u32) -> WavelengthCell {
         let cells = f64::from(LANES as u32 * (1 << samples.max(CELLS).ilog2()));
-        WavelengthCell { start: (u * cells).floor() / cells, width: 1.0 / cells }
+        WavelengthCell { shared: u, start: (u * cells).floor() / cells, width: 1.0 / cells }
     }
 
     /// Its number at `u` of [0, 1).

@@ -88,8 +88,8 @@ impl Shadow<'_> {
         }
         // Walk from one surface that lets light straight through to the next.
         let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
-        let (mut ray, mut left) = (*ray, distance);
-        for crossings in 0..=panes {
+        let (mut ray, mut left, mut crossed) = (*ray, distance, 0);
+        for crossings in 0..=MAX_BOUNDARIES {
             let hit = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target));
             let dimmed = dim(inside.medium, &ray, hit.map_or(left, |h| h.t), crossings);
             through *= dimmed.through;
@@ -100,9 +100,10 @@ impl Shadow<'_> {
                 left -= hit.t;
                 continue;
             }
-            if !scene.lets_through(hit.object) {
+            if crossed == panes || !scene.lets_through(hit.object) {
                 return None;
             }
+            crossed += 1;
             let (straight, surface) = self.pass(&ray, &hit, &mut inside)?;
             through *= straight.weight * straight.share as f32;
             passing *= straight.share as f32;

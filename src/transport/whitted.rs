@@ -134,19 +134,20 @@ impl Tracer<'_> {
             let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
             let hidden = crossing.is_some_and(|crossing| !crossing.shows);
             let beyond = scene.beyond(object, &surface, ray.direction, inside);
+            // A lamp shines whatever its surface bounds.
+            let emitted = object.light.map(|l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
+            arrived.light += emitted.unwrap_or(Lanes::ZERO) * arrived.kept * arrived.open;
             if !hidden {
                 let standpoint = Standpoint {
                     here: crossing.map_or(inside, |crossing| Inside { bodies: crossing.here, ..inside }),
                     beyond,
                     around: crossing.and_then(|crossing| crossing.around),
                 };
-                let emitted =
-                    object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
                 let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
                 let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
                 let at = Meeting { x: &vertex, standpoint };
                 let sent = self.scattered(&at, material, standing, weight * arrived.kept * arrived.open, depth);
-                arrived.light += (emitted + sent.light) * arrived.kept * arrived.open;
+                arrived.light += sent.light * arrived.kept * arrived.open;
                 let straight = sent.straight as f32;
                 if straight < 1.0 {
                     arrived.first.get_or_insert(surface.point);

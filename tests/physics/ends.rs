@@ -224,7 +224,7 @@ fn crossings_count_from_both_ends() {
     }
 }
 
-/// The same light lies in other pixels' filters, but none is lost: shares add up to one, for the last in the mean.
+/// The same light lies in other pixels' filters, but none is lost: shares add up to one in the mean over places.
 #[test]
 fn splats_keep_their_light_under_every_filter() {
     let scene =

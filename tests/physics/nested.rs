@@ -350,6 +350,25 @@ fn whitted_knows_bodies_that_overlap() {
     }
 }
 
+/// A lamp in a ball of glass shines whatever its surface bounds: also of the index of the ball, and within the ball, which is stronger.
+/// Where the indices are as near as 1.49 and 1.5 the same light comes to 1e-4.
+#[test]
+fn whitted_shows_lamps_whose_surface_is_not_there() {
+    let light = |ior: f64, priority: u32| {
+        bench(&format!(
+            "integrator: whitted\nshapes: [{{sphere: {{radius: 0.9, material: {{dielectric: {{ior: 1.5, priority: 5}}}}}}}}, \
+             {{sphere: {{radius: 0.4, emission: 1, material: {{dielectric: {{ior: {ior}, priority: {priority}}}}}}}}}]\n"
+        ))
+        .look(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0))
+    };
+    let expected = light(1.49, 9);
+    assert!(expected > 0.4, "{expected}");
+    for (ior, priority) in [(1.5, 9), (1.49, 1), (1.5, 1)] {
+        let found = light(ior, priority);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{ior} {priority}: {found} for {expected}");
+    }
+}
+
 /// Copies of a group are bodies too, and those of one thing that overlap are one.
 #[test]
 fn copies_that_overlap_are_one_body() {

@@ -15,6 +15,30 @@ fn disc_in_sky(rest: u8) -> Vec<u8> {
     grey_png(64, 32, |x, y| if (20..22).contains(&x) && (10..12).contains(&y) { 255 } else { rest })
 }
 
+/// A hidden lamp stands between the camera and a caustic. Where there is no pane nothing changes if panes count for the length of paths:
+/// the lamp is none.
+#[test]
+fn hidden_lamps_on_the_way_to_the_camera_are_no_panes() {
+    let light = |counted: bool| {
+        bench_with(
+            &format!(
+                "camera: {{origin: [0, 5, 0.01], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40}}\nimage: {{width: 16, height: 16}}\n\
+                 integrator: {{path: {{max_depth: 4, hide_emitters: true, count_crossings: {counted}}}}}\n\
+                 render: {{samples: 16, techniques: {{light_tracing: on, merging: off, glints: off}}}}\nshapes:\n\
+                 - rectangle: {{corner: [-3, 0, 3], edge_u: [6, 0, 0], edge_v: [0, 0, -6], material: {{diffuse: {{reflectance: 0.8}}}}}}\n\
+                 - sphere: {{center: [0, 0.9, 0], radius: 0.4, material: {{dielectric: {{ior: 1.5}}}}}}\n\
+                 - sphere: {{center: [0, 4, 0], radius: 0.25, emission: 100}}\n"
+            ),
+            &[],
+        )
+        .picture()
+        .y
+    };
+    let plain = light(false);
+    assert!(plain.iter().sum::<f64>() > 0.0);
+    assert_eq!(light(true), plain);
+}
+
 /// A black sky with a white disc of a thousandth of the sphere throws its light through a ball as a parallel light of
 /// the same irradiance does, to the width of the disc; an even sky and a lamp as large as the scene leave it to the camera.
 #[test]

@@ -54,8 +54,10 @@ impl Tracer<'_> {
             let (came, rho) = (photon.came.as_dvec3(), photon.light.rho);
             let cosine = came.dot(surface.normal).abs();
             let f = f(came);
-            // What has parted carries what all that could have led it there make of it already.
+            // What has parted carries what all that could have led it there make of it already, and one that goes on for all has led with
+            // its own density alone.
             let led = match CHROMATIC {
+                _ if path.chosen => LANES as f64,
                 true => f64::from((path.rho * rho).reduce_add()),
                 false => f64::from((path.led * rho).reduce_add()) * balanced,
             };
