@@ -42,6 +42,25 @@ fn threads_tiles_and_all_effects_do_not_change_a_bit() {
     }
 }
 
+/// A lit edge moves over a black picture while the shutter is open: the noise of its way is what the pilot has to see, or the shares come
+/// to eight times the samples that were asked for. Half or thrice of them is what it may come to where noise is in few cells.
+#[test]
+fn the_pilot_sees_what_moves() {
+    let film = bench_with(
+        "camera: {to_world: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 5], [0, 0, 0, 1]], orthographic_height: 64, \
+         shutter: {open: -0.5, close: 0.5, moments: 16}}\nimage: {width: 64, height: 64}\n\
+         render: {samples: 64, frames: 4, techniques: {adaptive: on}}\nintegrator: {path: {max_depth: 1}}\nshapes:\n\
+         - rectangle: {corner: [-100, -100, 0], edge_u: [100, 0, 0], edge_v: [0, 200, 0], emission: 1, \
+         transform: [{translate: [{3: -24, 4: 0, 5: 24}, 0, 0]}]}\n\
+         - sphere: {center: [26.5, 26.5, 1], radius: 0.45, emission: 1}\n",
+        &[],
+    )
+    .film();
+    let all: u32 = film.cells().iter().flatten().map(|cell| cell.count).sum();
+    let mean = f64::from(all) / film.cells().len() as f64;
+    assert!((32.0..192.0).contains(&mean), "{mean}");
+}
+
 fn render(
     place: &Place,
     out: &str,

@@ -9,7 +9,7 @@ use abbe::batch::{self, Overrides};
 use abbe::film::Window;
 use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
-use common::{Bench, bench_with, grey_png, on_threads, try_bench, write};
+use common::{Bench, bench_with, grey_png, on_threads, write};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

@@ -37,7 +37,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::path::reuse;
 use crate::transport::pilot::Use;
 use crate::transport::plan::{Adaptive, Effect, EffectPlan, Integrator};
-use crate::transport::{self, Shot};
+use crate::transport::{self, Shot, moment, scene_at};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -323,7 +323,9 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
             let mut means = [[0.0; 3]; REPLICATES];
             for (replicate, mean) in means.iter_mut().enumerate() {
                 for index in 0..each {
-                    let (sample, work) = transport::sample(&shot, place.map(|x| x as u32), replicate as u32, index);
+                    let (pixel, replicate) = (place.map(|x| x as u32), replicate as u32);
+                    let scene = scene_at(job.scene, job.moments, |n| moment(seed, pixel, replicate, index, n));
+                    let (sample, work) = transport::sample(&Shot { scene, ..shot }, pixel, replicate, index);
                     rays += OVERHEAD + work.rays;
                     if Invalid::of(sample.radiance).is_none() {
                         let rgb = ColourSpace::Rec709.from_xyz(sample.xyz.map(|x| x * sample.weight));

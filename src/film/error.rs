@@ -56,7 +56,7 @@ mod values;
 pub use values::Values;
 
 use super::accumulate::Film;
-use super::resolve::{Image, Splats, counts};
+use super::resolve::{HALF, Image, Splats, counts, in_halves};
 use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::fmt;
@@ -270,9 +270,15 @@ fn blocks(measured: &Measured, cell: u32) -> Vec<Told> {
                 for x in span(block % columns, before[0], window.width) {
                     let index = y as usize * window.width as usize + x as usize;
                     if measured.read(index, &mut values) {
-                        let counts = counts(&measured.film.cells()[index]);
-                        let [least, most] = [counts.iter().min(), counts.iter().max()].map(|n| n.copied().unwrap_or(0));
-                        told.add(&values, &measured.floors, measured.counted, most >= 2 * least);
+                        let cells = &measured.film.cells()[index];
+                        let counts = counts(cells);
+                        let uneven = |of: &[u64]| of.iter().max() >= of.iter().min().map(|least| 2 * least).as_ref();
+                        // Halves that were told how many samples they take weigh alike, whatever these are.
+                        let is_uneven = match in_halves(cells) {
+                            true => counts.chunks(HALF).any(uneven),
+                            false => uneven(&counts),
+                        };
+                        told.add(&values, &measured.floors, measured.counted, is_uneven);
                     }
                 }
             }
@@ -494,6 +500,25 @@ mod tests {
             estimate(&film).unwrap().1.valid
         };
         assert_eq!([4, 5, 6, 7, 8, 9].map(valid), [true, false, false, false, true, true]);
+    }
+
+    /// Halves of 8 and 16 samples a replicate weigh alike, and tell their error; replicates of one half do not.
+    #[test]
+    fn halves_of_other_numbers_tell_an_interval() {
+        let valid = |counts: [u64; REPLICATES]| {
+            let mut tile = TileBuffer::new(Window::full(16, 16));
+            for (pixel, replicate) in (0..256u64).flat_map(|pixel| (0..REPLICATES).map(move |r| (pixel, r))) {
+                for i in 0..counts[replicate] {
+                    let x = 1.0 + 0.1 * uniform(7, (pixel * 4 + replicate as u64) * 64 + i) as f32;
+                    tile.add([(pixel % 16) as i32, (pixel / 16) as i32], replicate, [x; 3], 1.0);
+                }
+            }
+            let mut film = Film::new([16, 16], Window::full(16, 16)).unwrap();
+            film.merge_tile(&tile);
+            estimate(&film).unwrap().1.valid
+        };
+        assert!(valid([8, 8, 16, 16]) && valid([8; 4]));
+        assert!(!valid([8, 16, 32, 32]) && !valid([8, 16, 8, 16]));
     }
 
     /// One pixel of 256 carries all of the error; or every pixel has light that comes once in 200 samples, of which it has

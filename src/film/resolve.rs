@@ -159,7 +159,7 @@ struct PixelMean {
 pub(super) const HALF: usize = REPLICATES / 2;
 
 /// Whether one half of the replicates had other samples than the other: replicates in turn differ by one.
-fn in_halves(cells: &PixelCells) -> bool {
+pub(super) fn in_halves(cells: &PixelCells) -> bool {
     let of = |cells: &[Cell]| cells.iter().map(|cell| u64::from(cell.count) + u64::from(cell.dropped)).sum::<u64>();
     of(&cells[..HALF]).abs_diff(of(&cells[HALF..])) > HALF as u64
 }

@@ -26,8 +26,6 @@ pub(super) struct Table {
     steps: Vec<[f32; 2]>,
     /// How many of these a pixel has.
     steps_of_a_pixel: f32,
-    /// ∫f over both halves.
-    pub(super) integral: f64,
     /// (∫|f| / ∫f)², the magnitude of the weight in two dimensions.
     pub(super) weight: f32,
 }
@@ -89,18 +87,7 @@ impl Table {
         // Non-negative filters: signed and total are the same sums of the same areas, so axis is 1 exactly.
         let weight = (axis * axis) as f32;
         let steps_of_a_pixel = (CELLS as f64 / radius) as f32;
-        Ok(Table {
-            x,
-            density,
-            cumulative,
-            signed: sums,
-            negative,
-            guide,
-            integral: 2.0 * signed,
-            weight,
-            steps,
-            steps_of_a_pixel,
-        })
+        Ok(Table { x, density, cumulative, signed: sums, negative, guide, weight, steps, steps_of_a_pixel })
     }
 
     /// What lies between the centre and `x` of 0 or more.
