@@ -316,7 +316,7 @@
 //!     albedo: 0.3                   # ~ of the ground
 //!     sky_scale: 1                  # ~
 //!     sun_scale: 1                  # ~ two lights, one without sun and one without sky, have layers of their own
-//!     sun_angle_deg: 0.5358         # ~ a wider disc gives the same light
+//!     sun_angle_deg: 0.5358         # ~ a wider disc gives the same light, above the horizon
 //!     limb_darkening: false         # ~
 //!     transform: []                 # ~ as of an environment
 //! - projector:

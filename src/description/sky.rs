@@ -30,7 +30,8 @@ pub struct SkyLight {
     /// Factor on the light of the sun; default 1.
     #[serde(default = "one")]
     pub sun_scale: f64,
-    /// Angle of the sun's disc, degrees; default 0.5358. What it gives to a surface stays the same.
+    /// Angle of the sun's disc, degrees; default 0.5358. What it gives to a surface stays the same, to 1 % up to 20 degrees, but for what
+    /// the horizon cuts off a wider disc, and with `limb_darkening`, where each part of it has the light of its own height.
     #[serde(default = "sun_angle_deg")]
     pub sun_angle_deg: f64,
     /// Whether the disc is darker toward its edge; default false, even.

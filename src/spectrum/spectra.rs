@@ -102,6 +102,10 @@ impl Spectrum {
             samples.push((cell[0], height));
             samples.push((cell[1], height));
         }
+        if samples.len() > Table::MOST {
+            let most = Table::MOST / 4;
+            return Err(format!("expected at most {most} lines apart from each other, found {}", lines.len()));
+        }
         Ok(Spectrum::Table(Arc::new(Table::from_checked(&samples, Outside::Zero))))
     }
 
@@ -309,6 +313,16 @@ mod tests {
 
     fn sodium() -> Spectrum {
         Spectrum::lines(&[(589.0, 2.0, 0.1), (589.6, 1.0, 0.1)]).unwrap()
+    }
+
+    /// More steps than a table can number are refused; twice as many lines that lie on each other make no more.
+    #[test]
+    fn lines_beyond_what_a_table_holds_are_refused() {
+        let comb = |n: u32| -> Vec<_> { (0..n).map(|i| (400.0 + 0.018 * f64::from(i), 1.0, 0.01)).collect() };
+        let told = Spectrum::lines(&comb(16_500)).unwrap_err();
+        assert_eq!(told, "expected at most 16383 lines apart from each other, found 16500");
+        assert!(Spectrum::lines(&comb(16_300)).is_ok());
+        assert!(Spectrum::lines(&comb(10_000).repeat(2)).is_ok());
     }
 
     /// ∫ line · ȳ = power · ȳ(centre): ȳ is linear across 0.1 nm inside a table cell.

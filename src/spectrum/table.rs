@@ -54,6 +54,9 @@ type Cell = [f32; 4];
 const MOST_CELLS: usize = 512;
 
 impl Table {
+    /// The most samples.
+    pub(crate) const MOST: usize = u16::MAX as usize;
+
     /// A table of (nm, value) in ascending order of wavelength.
     ///
     /// # Errors
@@ -63,8 +66,8 @@ impl Table {
         if samples.len() < 2 {
             return Err(format!("expected at least 2 samples (nm, value), found {}", samples.len()));
         }
-        if samples.len() > usize::from(u16::MAX) {
-            return Err(format!("expected at most 65535 samples, found {}", samples.len()));
+        if samples.len() > Table::MOST {
+            return Err(format!("expected at most {} samples, found {}", Table::MOST, samples.len()));
         }
         for (i, &(nm, value)) in samples.iter().enumerate() {
             if !(nm.is_finite() && nm > 0.0) {
