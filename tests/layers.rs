@@ -105,6 +105,18 @@ fn the_picture_in_lib_rs_shows_the_rooms_in_their_order() {
 }
 
 #[test]
+fn architecture_shows_the_same_picture() {
+    let page = fs::read_to_string("ARCHITECTURE.md").unwrap();
+    let theirs: Vec<&str> =
+        page.lines().skip_while(|line| *line != "```").skip(1).take_while(|l| *l != "```").collect();
+    let page = fs::read_to_string("src/lib.rs").unwrap();
+    let ours = page.lines().skip_while(|line| *line != "//! ```text").skip(1).take_while(|line| *line != "//! ```");
+    let ours: Vec<&str> = ours.map(|line| line.strip_prefix("//! ").unwrap_or("")).collect();
+    assert!(!ours.is_empty());
+    assert_eq!(theirs, ours);
+}
+
+#[test]
 fn every_file_is_in_a_room_of_the_picture_and_every_room_has_files() {
     let levels = levels();
     let files = sources(Path::new("src"));
