@@ -17,6 +17,7 @@ pub mod pilot;
 pub mod plan;
 mod roulette;
 mod shadow;
+mod spread;
 pub mod trial;
 pub mod ways;
 pub mod whitted;
@@ -24,7 +25,7 @@ pub mod whitted;
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::Ray;
-use crate::math::sampler::{GOLDEN, Octet, Sampler, Set, pairs};
+use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::watch::{self, Counts};
 use crate::scene::{DepthFog, Medium, Scene};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
@@ -35,6 +36,8 @@ use path::Sought;
 use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
 use ways::Ledger;
+
+pub use spread::Spread;
 
 /// Light that a camera ray brings.
 #[derive(Clone, Copy, Debug)]
@@ -600,49 +603,8 @@ impl Samples {
 /// its number behind a hole.
 fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32, left: Option<f64>) -> f64 {
     match &shot.plan.integrator {
-        Integrator::Whitted(settings) => left.unwrap_or_else(|| Spread::new(settings.samples, GOLDEN).at(at.in_turn())),
+        Integrator::Whitted(settings) => left.unwrap_or_else(|| Spread::of_holes(settings.samples).at(at.in_turn())),
         _ => sampler.set(Set::Extra(crossing << 16))[2],
-    }
-}
-
-/// The inverse of the plastic number, the real root of x³ = x + 1: its multiples are spread as evenly, and have little to do with
-/// those of [`GOLDEN`].
-const PLASTIC: f64 = 0.754_877_666_246_692_8;
-
-/// How the numbers of samples are spread over [0, 1).
-#[derive(Clone, Copy, Debug)]
-pub struct Spread {
-    count: u32,
-    step: u32,
-}
-
-impl Spread {
-    /// Of `count` samples, by steps next to `part` of them and coprime. With a part that fractions approximate badly the numbers of
-    /// neighbouring rows or columns of a pixel are spread nearly as evenly as all, so that what covers them meets its share.
-    fn new(count: u32, part: f64) -> Spread {
-        let is_coprime = |step: &u32| {
-            let (mut a, mut b) = (*step, count);
-            while b > 0 {
-                (a, b) = (b, a % b);
-            }
-            a == 1
-        };
-        let near = (part * f64::from(count)).round() as u32;
-        // count + 1 is.
-        let step = (near..=count + 1).find(is_coprime).unwrap_or(1);
-        Spread { count, step }
-    }
-
-    /// That of wavelengths.
-    #[must_use]
-    pub fn of_wavelengths(count: u32) -> Spread {
-        Spread::new(count, PLASTIC)
-    }
-
-    /// Of the numbers (k + 1/2)/n that of sample `s`: k = s · step mod n.
-    fn at(self, s: u32) -> f64 {
-        let k = u64::from(s) * u64::from(self.step) % u64::from(self.count);
-        (k as f64 + 0.5) / f64::from(self.count)
     }
 }
 
