@@ -13,7 +13,7 @@ use super::decode::decode;
 use super::edit::{self, Setting};
 use super::fault::{Checker, Fault};
 use super::mitsuba::{self, Define};
-use super::node::{Entry, Node, Place, Sources, Value, cut, quote};
+use super::node::{Entry, Node, Place, Sources, Value, not_finite, quote};
 use super::output::Output;
 use super::path::{At, Segment};
 use super::path_map::PathMap;
@@ -195,8 +195,7 @@ impl<'de> Deserialize<'de> for Digits {
             }
             // Of what is a number by its form, one beyond all floats.
             fn visit_str<E: serde::de::Error>(self, text: &str) -> std::result::Result<Digits, E> {
-                let (shown, more) = cut(text);
-                Err(E::custom(format!("expected a finite number, found {shown}{more}")))
+                Err(E::custom(not_finite(text)))
             }
         }
         deserializer.deserialize_any(Written)

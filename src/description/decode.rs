@@ -16,7 +16,7 @@ use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, IntoDeser
 use serde::forward_to_deserialize_any;
 
 use super::fault::Fault;
-use super::node::{Entry, Node, Place, Sources, Value, cut, enumerate};
+use super::node::{Entry, Node, Place, Sources, Value, enumerate, not_finite};
 use super::path::Segment;
 
 /// Names of variants that are chosen by form, and what they are called in a message.
@@ -99,9 +99,7 @@ impl<'a> De<'a> {
             Value::Float(value) => *value,
             Value::Text(text) => match overflowing(text) {
                 true => {
-                    let (shown, more) = cut(text);
-                    let message = format!("expected a finite number, found {shown}{more}");
-                    return Err(Fault::at_place(self.node.place, message));
+                    return Err(Fault::at_place(self.node.place, not_finite(text)));
                 }
                 false => return Err(Fault::expected(self.node, "a number")),
             },

@@ -222,8 +222,14 @@ pub(crate) fn quote(text: &str) -> String {
     format!("{shown:?}{more}")
 }
 
+/// What is said of a number in writing that is infinite in a double, cut when it is long.
+pub(crate) fn not_finite(text: &str) -> String {
+    let (shown, more) = cut(text);
+    format!("expected a finite number, found {shown}{more}")
+}
+
 /// As much of a text as an error shows, and dots where there is more.
-pub(crate) fn cut(text: &str) -> (&str, &'static str) {
+fn cut(text: &str) -> (&str, &'static str) {
     const LONGEST: usize = 60;
     text.char_indices().nth(LONGEST).map_or((text, ""), |(end, _)| (&text[..end], "…"))
 }

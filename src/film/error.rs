@@ -272,7 +272,7 @@ fn blocks(measured: &Measured, cell: u32) -> Vec<Told> {
                     if measured.read(index, &mut values) {
                         let cells = &measured.film.cells()[index];
                         let counts = counts(cells);
-                        let uneven = |of: &[u64]| of.iter().max() >= of.iter().min().map(|least| 2 * least).as_ref();
+                        let uneven = |of: &[u64]| of.iter().any(|most| of.iter().any(|least| *most >= 2 * least));
                         // Halves that were told how many samples they take weigh alike, whatever these are.
                         let is_uneven = match in_halves(cells) {
                             true => counts.chunks(HALF).any(uneven),

@@ -3,6 +3,7 @@
 use super::LAMP;
 use super::common::{Bench, Estimate, bench, bench_with, wavelengths};
 use super::pictures::{render, render_with};
+use super::reuse::over_seeds;
 use abbe::film::accumulate::REPLICATES;
 use abbe::film::filter::Filter;
 use abbe::film::resolve::{self, Splats};
@@ -20,18 +21,6 @@ fn bk7(nm: f64) -> f64 {
     (1.0 + terms.iter().map(|(b, c)| b * l2 / (l2 - c)).sum::<f64>()).sqrt()
 }
 
-/// Means of pictures over seeds.
-fn mean_over(seeds: Range<u64>, text: &str) -> Moments {
-    let mut bench = bench_with(text, &[]);
-    let mut all = Moments::default();
-    for seed in seeds {
-        bench.prepared.description.render.seed = seed;
-        let y = bench.picture().y;
-        all.push(y.iter().sum::<f64>() / y.len() as f64);
-    }
-    all
-}
-
 /// Photons of a lamp of one narrow line, of wavelengths near the shared one, in and beside the line: what they bring is the light of a
 /// glass that has the index of the line for all. Six pictures of each tell their means to some 0.4 %.
 #[test]
@@ -47,7 +36,7 @@ fn photons_of_a_narrow_line_keep_its_light() {
         )
     };
     let n = catalogue::glass("N-SF11").unwrap().at(589.0);
-    let [flint, one] = ["{glass: N-SF11}", &n.to_string()].map(|ior| mean_over(0..6, &scene(ior)));
+    let [flint, one] = ["{glass: N-SF11}", &n.to_string()].map(|ior| over_seeds(bench_with(&scene(ior), &[]), 0..6).1);
     assert!((flint.mean / one.mean - 1.0).abs() < 0.02, "{flint:?} for {one:?}");
 }
 
@@ -66,7 +55,7 @@ fn one_wavelength_that_goes_on_merges_for_all() {
              - cube: {{center: [0.6, 0.6, 2.45], size: [0.3, 0.3, 0.02], material: {{dielectric: {{ior: 1.5, roughness: 0.01}}}}}}\n"
         )
     };
-    let [apart, packets] = ["off", "on"].map(|packets| mean_over(0..4, &scene(packets)));
+    let [apart, packets] = ["off", "on"].map(|packets| over_seeds(bench_with(&scene(packets), &[]), 0..4).1);
     assert!((packets.mean / apart.mean - 1.0).abs() < 0.15, "{packets:?} for {apart:?}");
 }
 

@@ -49,13 +49,8 @@ impl Import<'_> {
             return Ok(Some(name.clone()));
         }
         let bag = self.bag(index);
-        let nested = bag.only(Family::Texture)?;
-        let is_spectrum = |index: &usize| SPECTRA.contains(&bag.document.objects[*index].plugin.as_str());
-        let Some(nested) = nested.filter(|index| !is_spectrum(index)) else { return Ok(None) };
+        let Some((nested, scale)) = within(&bag)? else { return Ok(None) };
         let place = bag.object.place;
-        let scale = bag.float("scale")?.unwrap_or(1.0);
-        not_negative(&bag, "scale", &[scale])?;
-        bag.finish()?;
         let plain = self.declare_texture(nested)?;
         let lit =
             self.textures.iter().find(|entry| entry.key == plain).and_then(|entry| match entry.node.get("image") {
@@ -73,14 +68,11 @@ impl Import<'_> {
     /// The name of what hangs in a spot, and the scale of the D65 around it where there is one.
     pub(super) fn slide(&mut self, index: usize) -> Result<(String, Option<f64>), Fault> {
         let bag = self.bag(index);
-        let is_spectrum = |index: &usize| SPECTRA.contains(&bag.document.objects[*index].plugin.as_str());
-        let of_daylight = bag.object.plugin == "d65";
-        let inner = if of_daylight { bag.only(Family::Texture)?.filter(|index| !is_spectrum(index)) } else { None };
-        let Some(inner) = inner else { return Ok((self.declare_texture(index)?, None)) };
-        let scale = bag.float("scale")?.unwrap_or(1.0);
-        not_negative(&bag, "scale", &[scale])?;
-        bag.finish()?;
-        Ok((self.declare_texture(inner)?, Some(scale)))
+        let lit = if bag.object.plugin == "d65" { within(&bag)? } else { None };
+        match lit {
+            Some((inner, scale)) => Ok((self.declare_texture(inner)?, Some(scale))),
+            None => Ok((self.declare_texture(index)?, None)),
+        }
     }
 
     /// Whether a texture is D65 times a picture, or has such squares. Textures that were `seen` are not.
@@ -94,6 +86,16 @@ impl Import<'_> {
         (bag.object.plugin == "d65" && inner.iter().any(varies))
             || inner.into_iter().any(|inner| self.is_lit(inner, seen))
     }
+}
+
+/// What is within a `d65` that is no spectrum, and the scale; `None` where there is none such.
+fn within(bag: &Bag<'_>) -> Result<Option<(usize, f64)>, Fault> {
+    let is_spectrum = |index: &usize| SPECTRA.contains(&bag.document.objects[*index].plugin.as_str());
+    let Some(inner) = bag.only(Family::Texture)?.filter(|index| !is_spectrum(index)) else { return Ok(None) };
+    let scale = bag.float("scale")?.unwrap_or(1.0);
+    not_negative(bag, "scale", &[scale])?;
+    bag.finish()?;
+    Ok(Some((inner, scale)))
 }
 
 /// CIE D65, of luminance `scale` on Mitsuba's film.
