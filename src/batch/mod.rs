@@ -32,6 +32,7 @@ pub mod stop;
 mod techniques;
 pub mod tev;
 mod unit;
+pub mod words;
 
 use crate::description::{self, BatchEntry, PathMap, SceneDescription};
 use crate::error::{Error, Result};

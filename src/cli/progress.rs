@@ -1,10 +1,11 @@
 //! How a render tells of its progress: bars, lines, JSON, nothing.
 
 use super::ProgressStyle;
-use super::render::{per_cent, per_cent_between, seconds, seconds_between};
+use super::render::{per_cent_between, seconds_between};
 use super::{complain, say};
 use crate::batch::frame::Progress;
 use crate::batch::report::{SceneReport, Status};
+use crate::batch::words::{per_cent, seconds};
 use crate::batch::{Turn, Watcher};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use serde_json::json;

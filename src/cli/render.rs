@@ -7,6 +7,7 @@ use super::{ProgressStyle, RenderArguments};
 use crate::batch;
 use crate::batch::report::{Report, SceneReport, Status};
 use crate::batch::tev::Viewer;
+use crate::batch::words::{per_cent, seconds};
 use crate::error::Result;
 use crate::film::output::prepare_place;
 use std::fmt::Write;
@@ -109,24 +110,6 @@ fn endings(scenes: &[SceneReport]) -> Vec<String> {
         lines.push(format!("stopped: {what} written so far: {written}; --resume goes on with the others"));
     }
     lines
-}
-
-/// A duration as a person says it.
-pub fn seconds(s: f64) -> String {
-    if s < 0.1 {
-        format!("{:.0} ms", s * 1e3)
-    } else if s < 100.0 {
-        format!("{s:.1} s")
-    } else if s < 6000.0 {
-        format!("{:.1} min", s / 60.0)
-    } else {
-        format!("{:.1} h", s / 3600.0)
-    }
-}
-
-/// A share as a person says it.
-pub fn per_cent(x: f64) -> String {
-    if x < 0.1 { format!("{:.2} %", x * 100.0) } else { format!("{:.1} %", x * 100.0) }
 }
 
 /// Two shares, with the sign once.

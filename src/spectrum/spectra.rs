@@ -188,35 +188,6 @@ impl Spectrum {
         }
     }
 
-    /// One minus this spectrum, for one that lies in [0, 1]: exact for numbers and smooth colours, else linear
-    /// between the knots and whole nanometres.
-    #[must_use]
-    pub fn complement(&self) -> Spectrum {
-        match self {
-            Spectrum::Constant(value) => Spectrum::Constant(1.0 - value),
-            // 1 − s(x) = s(−x) for the sigmoid s(x) = ½ + x / (2 √(1 + x²)).
-            Spectrum::Sigmoid { c, scale: 1.0 } => Spectrum::Sigmoid { c: c.map(|c| -c), scale: 1.0 },
-            _ => {
-                let mut nodes: Vec<f64> = self.breakpoints();
-                nodes.extend((BAND_NM[0] as u32..=BAND_NM[1] as u32).map(f64::from));
-                nodes.retain(|nm| (BAND_NM[0]..=BAND_NM[1]).contains(nm));
-                nodes.sort_by(f64::total_cmp);
-                nodes.dedup();
-                let rest = |nm: f64| (1.0 - self.at(nm)).max(0.0);
-                let mut samples = Vec::with_capacity(nodes.len());
-                for nm in nodes {
-                    // A jump is two knots at one wavelength; the table is continuous from the right.
-                    let (left, right) = (rest(nm.next_down()), rest(nm));
-                    if (left - right).abs() > 1e-9 {
-                        samples.push((nm, left));
-                    }
-                    samples.push((nm, right));
-                }
-                Spectrum::Table(Arc::new(Table::from_checked(&samples, Outside::Hold)))
-            }
-        }
-    }
-
     /// Whether the value is the same over the whole band.
     #[must_use]
     pub fn is_constant(&self) -> bool {

@@ -3,6 +3,7 @@
 use super::{Card, EMBEDDED, encode, link};
 use crate::batch::accuracy::page::{base64, escaped};
 use crate::batch::report::{Report, SceneReport, Status};
+use crate::batch::words;
 use crate::film::heat::Small;
 use crate::transport::plan::Effect;
 use std::io::Write;
@@ -35,18 +36,18 @@ impl Figures {
     /// One short line.
     pub(super) fn short(&self) -> String {
         let error = match self.error {
-            Some([error, ..]) if self.valid => format!(", {}", share(error)),
+            Some([error, ..]) if self.valid => format!(", {}", words::per_cent(error)),
             Some(_) => ", noisy".to_owned(),
             None => String::new(),
         };
-        format!("{} spp{error}, {}", self.samples, time(self.seconds))
+        format!("{} spp{error}, {}", self.samples, words::seconds(self.seconds))
     }
 
     /// The error in words.
     fn error(&self, scene: &SceneReport) -> String {
         match (self.error, scene.integrator.as_str()) {
             (Some([error, low, high]), _) if self.valid => {
-                format!("{} ({} to {})", share(error), share(low), share(high))
+                format!("{} ({} to {})", words::per_cent(error), words::per_cent(low), words::per_cent(high))
             }
             (Some(_), _) => "not converged".to_owned(),
             (None, "whitted") => "no noise".to_owned(),
@@ -63,20 +64,6 @@ impl Figures {
             None if scene.integrator == "whitted" => "good",
             None => "",
         }
-    }
-}
-
-fn share(x: f64) -> String {
-    let per_cent = 100.0 * x;
-    if per_cent < 1.0 { format!("{per_cent:.2} %") } else { format!("{per_cent:.1} %") }
-}
-
-fn time(s: f64) -> String {
-    match s {
-        s if s < 0.1 => format!("{:.0} ms", 1e3 * s),
-        s if s < 100.0 => format!("{s:.1} s"),
-        s if s < 6000.0 => format!("{:.1} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
     }
 }
 
@@ -136,7 +123,7 @@ fn about(cards: &[Card], report: &Report) -> String {
     let there = cards.iter().filter(|card| matches!(report.scenes[card.scene].status, Status::Skipped)).count();
     let mut about = vec![
         plural(cards.len(), "picture"),
-        format!("{} on {}", time(report.seconds), plural(report.threads, "thread")),
+        format!("{} on {}", words::seconds(report.seconds), plural(report.threads, "thread")),
         format!("Abbe {}", report.version),
     ];
     if there > 0 {
@@ -172,9 +159,9 @@ fn summary(cards: &[Card], report: &Report) -> String {
     {
         sentences.push(format!(
             "Errors go from {} (<b>{}</b>) to {} (<b>{}</b>).",
-            share(best.1),
+            words::per_cent(best.1),
             escaped(best.0),
-            share(worst.1),
+            words::per_cent(worst.1),
             escaped(worst.0)
         ));
     }
@@ -184,8 +171,8 @@ fn summary(cards: &[Card], report: &Report) -> String {
         if let Some((name, seconds)) = costliest.max_by(|a, b| a.1.total_cmp(&b.1)) {
             sentences.push(format!(
                 "To halve every error would take {} more, {} of it for <b>{}</b>.",
-                time(halving),
-                time(seconds),
+                words::seconds(halving),
+                words::seconds(seconds),
                 escaped(name)
             ));
         }
@@ -217,7 +204,7 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
         None => String::new(),
     };
     let [width, height] = scene.resolution;
-    let half = figures.halving_seconds.map_or(String::new(), |s| format!(", half of it in {} more", time(s)));
+    let half = figures.halving_seconds.map_or(String::new(), |s| format!(", half of it in {} more", words::seconds(s)));
     let chip = |e: &Effect| format!("<li title=\"{}\">{}</li>", escaped(&e.reason), escaped(&e.name));
     let chips: String = scene.effects.iter().filter(|e| e.on).map(chip).collect();
     let developed = scene
@@ -242,7 +229,7 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
          <button data-pick=\"b\" data-i=\"{i}\">after</button> <a href=\"{}\">EXR</a></p>\
          <details><summary>Plan{}</summary><table>{plan}</table>{notes}</details></figcaption></figure>\n",
         figures.samples,
-        time(figures.seconds),
+        words::seconds(figures.seconds),
         figures.class(scene),
         escaped(&figures.error(scene)),
         escaped(&link(dir, &card.exr)),
@@ -260,10 +247,10 @@ fn row(i: usize, scene: &SceneReport) -> String {
     let mut out = format!("<tr><td data-v=\"{i}\"><a href=\"#f{i}\">{}</a>", escaped(&scene.label()));
     out += &cell(pixels, &format!("{width} × {height}"));
     out += &cell(figures.samples, &figures.samples.to_string());
-    out += &cell(figures.seconds, &time(figures.seconds));
+    out += &cell(figures.seconds, &words::seconds(figures.seconds));
     out += &cell(figures.error.map_or(-1.0, |e| e[0]), &escaped(&figures.error(scene)));
     let half = figures.halving_seconds;
-    out += &cell(half.unwrap_or(-1.0), &half.map_or("-".to_owned(), |s| format!("+{}", time(s))));
+    out += &cell(half.unwrap_or(-1.0), &half.map_or("-".to_owned(), |s| format!("+{}", words::seconds(s))));
     out + &format!("<td>{}\n", escaped(&on.join(", ")))
 }
 

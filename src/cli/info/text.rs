@@ -1,7 +1,7 @@
 //! The answer as a person reads it.
 
 use super::facts::{ChannelFacts, ExrFacts, LayerFacts, PartFacts};
-use crate::cli::render::{per_cent, seconds};
+use crate::batch::words::{per_cent, seconds};
 use crate::cli::text::columns;
 use crate::film::Window;
 use crate::film::exr::header::Value;
