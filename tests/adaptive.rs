@@ -204,48 +204,52 @@ fn adaptive_sampling_is_off_where_it_would_not_be_exact() {
 /// renders, so that the mean over 256 pixels scatters by √(2/256), and four times that is 0.35.
 ///
 /// With each half's number told by what it shows itself the test fails: z −4.4 and 1.41, and −9.1 and 1.67 for 1000 renders of
-/// 16 samples, where halves told by each other have 0.7 and 0.97.
+/// 16 samples, where halves told by each other have 0.7 and 0.97. Under the Gaussian, whose samples count for several pixels, halves that make
+/// up for what their weights lack by each other's light have −12 over 100 renders of 40 × 32 pixels; of its pixels, which are not independent
+/// of each other, only the mean is held.
 #[test]
 fn the_mean_of_adaptive_renders_is_that_of_uniform_ones() {
     let renders: u64 = if std::env::var_os("ABBE_NIGHTLY").is_some() { 1000 } else { 400 };
-    let text = |adaptive: &str| {
-        format!(
-            "camera: {{origin: [0, 3, 4], target: [0, 0, 0], fov_deg: 40}}\n\
-             image: {{width: 16, height: 16}}\n\
+    for filter in ["box", "{gaussian: {stddev: 0.5}}"] {
+        let text = |adaptive: &str| {
+            format!(
+                "camera: {{origin: [0, 3, 4], target: [0, 0, 0], fov_deg: 40}}\n\
+             image: {{width: 16, height: 16, filter: {filter}}}\n\
              integrator: {{path: {{max_depth: 2, light_samples: 0}}}}\n\
              render: {{samples: 32, techniques: {{adaptive: {adaptive}}}}}\n\
              shapes:\n\
              - plane: {{normal: [0, 1, 0]}}\n\
              - sphere: {{center: [0.5, 2, 0], radius: 0.3, emission: 20}}\n"
-        )
-    };
-    let values = |bench: &mut Bench, seed: u64| -> Vec<f64> {
-        bench.prepared.description.render.seed = seed;
-        let image = bench.frame().resolve(&ColourSpace::Rec709.matrix_from_xyz());
-        image.rgb[1].iter().map(|x| f64::from(*x)).collect()
-    };
-    let of = |adaptive: &str, first: u64, renders: u64| -> (Vec<Moments>, Moments) {
-        let mut bench = bench_with(&text(adaptive), &[]);
-        assert_eq!(bench.prepared.plan.adaptive.is_some(), adaptive == "on");
-        let (mut pixels, mut all) = (vec![Moments::default(); 256], Moments::default());
-        for seed in first..first + renders {
-            let values = values(&mut bench, seed);
-            all.push(values.iter().sum::<f64>() / 256.0);
-            pixels.iter_mut().zip(values).for_each(|(moments, x)| moments.push(x));
-        }
-        (pixels, all)
-    };
-    let (uniform, uniform_mean) = of("off", 1 << 32, 2 * renders);
-    let (adaptive, adaptive_mean) = of("on", 0, renders);
-    let z = |a: &Moments, b: &Moments| (a.mean - b.mean) / a.standard_error().hypot(b.standard_error());
-    let global = z(&adaptive_mean, &uniform_mean);
-    let squares: f64 = adaptive.iter().zip(&uniform).map(|(a, b)| z(a, b).powi(2)).sum::<f64>() / 256.0;
-    assert!(
-        global.abs() < 4.0 && (squares - 1.0).abs() < 0.35,
-        "z {global:.2}, squares {squares:.3}; means {} and {}",
-        adaptive_mean.mean,
-        uniform_mean.mean
-    );
+            )
+        };
+        let values = |bench: &mut Bench, seed: u64| -> Vec<f64> {
+            bench.prepared.description.render.seed = seed;
+            let image = bench.frame().resolve(&ColourSpace::Rec709.matrix_from_xyz());
+            image.rgb[1].iter().map(|x| f64::from(*x)).collect()
+        };
+        let of = |adaptive: &str, first: u64, renders: u64| -> (Vec<Moments>, Moments) {
+            let mut bench = bench_with(&text(adaptive), &[]);
+            assert_eq!(bench.prepared.plan.adaptive.is_some(), adaptive == "on");
+            let (mut pixels, mut all) = (vec![Moments::default(); 256], Moments::default());
+            for seed in first..first + renders {
+                let values = values(&mut bench, seed);
+                all.push(values.iter().sum::<f64>() / 256.0);
+                pixels.iter_mut().zip(values).for_each(|(moments, x)| moments.push(x));
+            }
+            (pixels, all)
+        };
+        let (uniform, uniform_mean) = of("off", 1 << 32, 2 * renders);
+        let (adaptive, adaptive_mean) = of("on", 0, renders);
+        let z = |a: &Moments, b: &Moments| (a.mean - b.mean) / a.standard_error().hypot(b.standard_error());
+        let global = z(&adaptive_mean, &uniform_mean);
+        let squares: f64 = adaptive.iter().zip(&uniform).map(|(a, b)| z(a, b).powi(2)).sum::<f64>() / 256.0;
+        assert!(
+            global.abs() < 4.0 && (filter != "box" || (squares - 1.0).abs() < 0.35),
+            "{filter}: z {global:.2}, squares {squares:.3}; means {} and {}",
+            adaptive_mean.mean,
+            uniform_mean.mean
+        );
+    }
 }
 
 /// Where samples count for several pixels, or paths are shared, less noise is left than a pixel by itself shows. What is shared out is what was asked for all

@@ -31,7 +31,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT, TileBuffer};
 use crate::film::error::floor_about;
 use crate::film::layers::Kept;
-use crate::film::resolve::replicate_means;
+use crate::film::resolve::means_of_halves;
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
 use crate::transport::path::reuse;
@@ -415,7 +415,7 @@ fn wishes_of_whole_cells(
 /// The means of the replicates of the `pixels` of `film`, which holds them all.
 fn means(film: &Film, pixels: Window, rgb_from_xyz: &[[f64; 3]; 3]) -> Vec<[[f64; 3]; REPLICATES]> {
     let window = film.window();
-    pixels.iter().filter_map(|pixel| replicate_means(film, window.index(pixel)?, rgb_from_xyz)).collect()
+    pixels.iter().filter_map(|pixel| means_of_halves(film, window.index(pixel)?, rgb_from_xyz)).collect()
 }
 
 /// Share of a cell up to a factor that all have in common.

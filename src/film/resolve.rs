@@ -190,9 +190,19 @@ pub(super) fn even<const N: usize>(
     counts: [u64; REPLICATES],
     weights: [f64; REPLICATES],
 ) {
+    even_among(REPLICATES, means, counts, weights);
+}
+
+/// The same from others of its own group of so many alone.
+fn even_among<const N: usize>(
+    group: usize,
+    means: &mut [[f64; N]; REPLICATES],
+    counts: [u64; REPLICATES],
+    weights: [f64; REPLICATES],
+) {
     let sums: [[f64; N]; REPLICATES] = std::array::from_fn(|r| means[r].map(|mean| mean * counts[r] as f64));
     for (r, mean) in means.iter_mut().enumerate().filter(|(r, _)| counts[*r] > 0) {
-        let others = || (0..REPLICATES).filter(|&s| s != r && counts[s] > 0);
+        let others = || (0..REPLICATES).filter(|&s| s / group == r / group && s != r && counts[s] > 0);
         let all: f64 = others().map(|s| weights[s]).sum();
         let lack = 1.0 - weights[r] / counts[r] as f64;
         for (channel, mean) in mean.iter_mut().enumerate() {
@@ -263,13 +273,18 @@ impl Sums<'_> {
 
     /// The mean of each replicate, zero where it has none.
     fn means_or_zero(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
+        self.means_among(REPLICATES, rgb_from_xyz)
+    }
+
+    /// The same, evened within groups of so many.
+    fn means_among(&self, group: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
         let Sums { cells, divisors, weights } = *self;
         let mut means = [[0.0; 3]; REPLICATES];
         for (r, mean) in means.iter_mut().enumerate().filter(|(r, _)| divisors[*r] > 0) {
             *mean = colours(&cells[r..=r], divisors[r], rgb_from_xyz);
         }
         if let Some(weights) = weights {
-            even(&mut means, divisors, weights);
+            even_among(group, &mut means, divisors, weights);
         }
         means
     }
@@ -346,10 +361,12 @@ pub fn counts(cells: &PixelCells) -> [u64; REPLICATES] {
     cells.each_ref().map(|cell| u64::from(cell.count))
 }
 
-/// The mean of each replicate of a pixel of `film`, in its units; `None` where one has no sample.
+/// The mean of each replicate of a pixel of `film`, in its units; `None` where one has no sample. What one half of the replicates tells
+/// is its own: what a weight lacks is made up for by the other of its half.
 #[must_use]
-pub fn replicate_means(film: &Film, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
-    Sums::of(film, index).means(rgb_from_xyz)
+pub fn means_of_halves(film: &Film, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
+    let sums = Sums::of(film, index);
+    (!sums.divisors.contains(&0)).then(|| sums.means_among(HALF, rgb_from_xyz))
 }
 
 /// The light of each replicate of a pixel of `film` and `splats`, in the scene's units; `None` where one has none.
@@ -529,6 +546,11 @@ mod tests {
         let found = evened([4.0, 8.0, 0.0, 0.0], [2; 4]);
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
         assert_eq!(evened([0.0, 6.0, 0.0, 0.0], [0, 2, 0, 0]), [0.0, 2.0, 0.0, 0.0]);
+        // Within halves the first lacks 1 of 2 times 8/3, the second has 1 too many of 4/1, and the other half is as dark as it is.
+        let mut means = [[2.0], [4.0], [0.0], [0.0]];
+        even_among(HALF, &mut means, [2; 4], [1.0, 3.0, 2.0, 2.0]);
+        let expected = [2.0 + 0.5 * 8.0 / 3.0, 4.0 - 0.5 * 4.0, 0.0, 0.0];
+        assert!(means.iter().zip(expected).all(|([a], b)| (a - b).abs() < 1e-15), "{means:?}");
     }
 
     /// Camera light 2 ± s₁ and splats of total 12 over 4·3 photons: 1 ± s₂. Means add, variances add; all in units of 2³.

@@ -3,7 +3,7 @@
 use super::accumulate::{Film, REPLICATES};
 use super::compare::GLOBAL_ALPHA;
 use super::error::Values;
-use super::resolve::{Splats, counts, layer_or_zero, light_or_zero};
+use super::resolve::{Splats, counts, in_halves, layer_or_zero, light_or_zero};
 use crate::math::statistics::student_t_half_width;
 use std::collections::HashMap;
 
@@ -95,8 +95,10 @@ pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[
         }
         let nothing = || ([0.0; REPLICATES], vec![Sums::default(); errors.len()]);
         let (samples, sums) = cells.entry(pixel.map(place)).or_insert_with(nothing);
+        // Halves weigh alike, however many samples they have.
+        let halves = in_halves(counted);
         for (all, count) in samples.iter_mut().zip(counts(counted)) {
-            *all += count as f64;
+            *all += if halves { 1.0 } else { count as f64 };
         }
         for ((sums, value), errors) in sums.iter_mut().zip(&light).zip(errors) {
             replicates.iter().for_each(|&r| sums.light[r] += value[r]);
