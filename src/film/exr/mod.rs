@@ -9,13 +9,15 @@
 //!
 //! Source: "OpenEXR File Layout", openexr.com (technical documentation), and its list of standard attributes.
 
+mod chunks;
 pub mod header;
 mod pack;
 pub mod part;
 mod read;
 mod write;
 
-pub use read::{ExrFile, ExrPart, Samples, read_exr, rows_are_apart};
+pub use chunks::rows_are_apart;
+pub use read::{ExrFile, ExrPart, Samples, read_exr};
 pub use write::{encode_exr, write_exr};
 
 use crate::error::Result;

@@ -1,5 +1,6 @@
 //! Reads any flat OpenEXR file that the `exr` crate can decode.
 
+use super::chunks;
 use super::content_hash;
 use super::header::{Header, read_headers};
 use crate::error::{Error, Result};
@@ -10,7 +11,7 @@ use ::exr::image::FlatSamples;
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
 use ::exr::prelude::{ReadChannels, ReadLayers, read};
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Read, Seek};
 use std::path::Path;
 
 /// Files with more samples than this (8 GiB as f32) are refused rather than risked.
@@ -129,46 +130,15 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
     let meta = MetaData::read_from_buffered(&mut reader, false).map_err(fail)?;
     let length = reader.get_ref().metadata().map_err(|e| Error::input(path, e.to_string()))?.len();
     check_size(path, &meta, length)?;
+    if !chunks::counts_can_be(&mut reader, &meta, length).map_err(|e| Error::input(path, e.to_string()))? {
+        return Err(Error::input(path, "not a valid OpenEXR file: a chunk announces more than its pixels can take"));
+    }
     reader.rewind().map_err(|e| Error::input(path, e.to_string()))?;
     let file = parts_of(reader).map_err(fail)?;
     if file.parts.is_empty() {
         return Err(Error::input(path, "the file has no part with pixels"));
     }
     Ok(file)
-}
-
-/// Whether the rows of the file at `path`, which has no tiles, lie in it one behind the other: no chunk of them ends beyond the
-/// beginning of the next one or the end of the file. A length that is damaged need not show in the pixels that are read here, for
-/// what follows the end of deflated rows is passed over; other readers refuse them.
-///
-/// # Errors
-/// Of the system, or for a file that ends early.
-pub fn rows_are_apart(path: &Path) -> std::io::Result<bool> {
-    let mut reader = std::io::BufReader::new(std::fs::File::open(path)?);
-    let length = reader.get_ref().metadata()?.len();
-    let meta = MetaData::read_from_buffered(&mut reader, false).map_err(std::io::Error::other)?;
-    // The table of where the chunks of all parts begin.
-    let count = meta.headers.iter().map(|header| header.chunk_count as u64).sum::<u64>().min(length / 8);
-    let mut starts = Vec::new();
-    let mut word = [0; 8];
-    for _ in 0..count {
-        reader.read_exact(&mut word)?;
-        starts.push(u64::from_le_bytes(word));
-    }
-    starts.sort_unstable();
-    let mut file = reader.into_inner();
-    // A chunk begins with the number of its part, where there are several, and that of its first row.
-    let before = if meta.requirements.has_multiple_layers { 8 } else { 4 };
-    for (i, start) in starts.iter().enumerate() {
-        file.seek(SeekFrom::Start(start.saturating_add(before)))?;
-        let mut size = [0; 4];
-        file.read_exact(&mut size)?;
-        let end = start.saturating_add(before + 4 + u64::from(u32::from_le_bytes(size)));
-        if end > starts.get(i + 1).copied().unwrap_or(length) {
-            return Ok(false);
-        }
-    }
-    Ok(true)
 }
 
 /// What [`read_exr`] will read of the `bytes` of a file.
