@@ -43,9 +43,7 @@ impl Bands {
         let fail = |message: String| Err(Error::input(path, message));
         let mut found: Vec<(Quantity, f64, &[f32])> = Vec::new();
         for (name, plane) in &part.channels {
-            let Some((quantity, rest)) = ([("S0.", Quantity::Radiance), ("T.", Quantity::Reflectance)].into_iter())
-                .find_map(|(prefix, quantity)| name.strip_prefix(prefix).map(|rest| (quantity, rest)))
-            else {
+            let Some((quantity, rest)) = quantity(name) else {
                 if ["S1.", "S2.", "S3."].iter().any(|prefix| name.starts_with(prefix))
                     && wavelength(&name[3..]).is_some()
                 {
@@ -183,6 +181,19 @@ impl Bands {
         let n = self.nm.len() as f32;
         self.values.chunks_exact(self.nm.len()).map(|texel| texel.iter().sum::<f32>() / n).collect()
     }
+}
+
+/// What the channel `name` is of by the beginning of its name, and the rest of that.
+fn quantity(name: &str) -> Option<(Quantity, &str)> {
+    [("S0.", Quantity::Radiance), ("T.", Quantity::Reflectance)]
+        .into_iter()
+        .find_map(|(prefix, quantity)| name.strip_prefix(prefix).map(|rest| (quantity, rest)))
+}
+
+/// Whether the channel `name` is a band: any layer may be called T.
+#[must_use]
+pub fn is_band(name: &str) -> bool {
+    quantity(name).is_some_and(|(_, rest)| wavelength(rest).is_some())
 }
 
 /// The wavelength of `450,500000nm` in nm; units are those of the layout, from picometres to metres, and hertz.

@@ -5,6 +5,7 @@ mod curve;
 mod decoded;
 mod jpeg;
 mod pfm;
+mod radiance;
 
 pub use anew::for_mitsuba;
 pub use curve::samples;
@@ -16,8 +17,9 @@ use crate::error::{Error, Result};
 use crate::film::{Window, exr, icc, png};
 use crate::spectrum::Carried;
 use crate::spectrum::colour::{self, ColourSpace};
-use decoded::{COLOURS, count, extension};
+use decoded::{COLOURS, count};
 use rayon::prelude::*;
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -45,13 +47,22 @@ pub fn cut_out(path: &Path, file: &exr::ExrFile) -> Option<String> {
     })
 }
 
-/// What a person should know of a PNG or JPEG file that says that its colours are others than those that they are taken for.
-fn other_colours(path: &Path) -> Option<String> {
-    let said = match extension(path).as_str() {
-        "jpg" | "jpeg" => icc::colours(path).filter(|colours| !png::inspect::are_srgb(colours)),
-        _ => png::inspect::other_colours(path),
-    }?;
-    Some(format!("{} says that its colours are {said}; they are taken for sRGB", path.display()))
+/// What a person should know of a file that says of its colours or its light what is not minded: PNG and JPEG files are taken for sRGB.
+fn not_minded(file: &Path) -> Option<String> {
+    /// More than heads have.
+    const HEAD: u64 = 1 << 16;
+    let mut head = Vec::new();
+    crate::input::open(file).ok()?.take(HEAD).read_to_end(&mut head).ok()?;
+    let path = file.display();
+    if radiance::is(&head) {
+        return radiance::says(&head).map(|said| format!("{path} says {said}; its numbers are taken as they are"));
+    }
+    let said = match image::guess_format(&head).ok()? {
+        image::ImageFormat::Png => png::inspect::other_colours(file),
+        image::ImageFormat::Jpeg => icc::colours(file).filter(|colours| !png::inspect::are_srgb(colours)),
+        _ => None,
+    };
+    Some(format!("{path} says that its colours are {}; they are taken for sRGB", said?))
 }
 
 /// A picture of light from the file `path`: EXR by its chromaticities, HDR as it is, 8- and 16-bit files decoded from sRGB.
@@ -59,7 +70,7 @@ fn other_colours(path: &Path) -> Option<String> {
 /// # Errors
 /// [`Error::Input`] where a pixel is not finite.
 pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
-    let mut notes = Vec::from_iter(other_colours(path));
+    let mut notes = Vec::from_iter(not_minded(path));
     let picture = match decoded {
         Decoded::Exr(file) => {
             notes.extend(cut_out(path, &file));
@@ -166,7 +177,7 @@ pub fn image_texture(
         let none = make(Texels::each(Vec::new()), width as usize, height as usize);
         return Ok((ImageTexture { bands: Some(bands), ..none }, cut_out(path, file)));
     }
-    let colours = || if raw { None } else { other_colours(path) };
+    let colours = || if raw { None } else { not_minded(path) };
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
@@ -192,11 +203,9 @@ pub fn image_texture(
     }
 }
 
-/// A reflectance; or of a colour above one its largest channel times the reflectance of the same hue, so that there is no
-/// step at one.
 fn colour_texel(rgb: [f32; 3], carried: Carried) -> Texel {
-    let scale = rgb.into_iter().fold(1.0, f32::max);
-    Texel { coefficients: carried.coefficients(rgb.map(|x| x / scale)), scale }
+    let (coefficients, scale) = carried.texel(rgb);
+    Texel { coefficients, scale }
 }
 
 /// Texels of pixels of the given levels. Many share a colour: each is upsampled once.
@@ -248,7 +257,7 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::{Spectrum, illuminant, observer, upsample};
+    use crate::spectrum::{Spectrum, illuminant, observer};
 
     #[test]
     fn negative_numbers_of_a_picture_are_told() {
@@ -346,24 +355,32 @@ mod tests {
         for (i, p) in pixels.chunks_exact(3).enumerate() {
             let texel = texels.at(i);
             let rgb = [0, 1, 2].map(|k| colour::srgb_decode(f32::from(p[k]) / 255.0));
-            assert_eq!(texel.coefficients, upsample::coefficients(rgb), "{p:?}");
+            assert_eq!((texel.coefficients, texel.scale), Carried::Spectra.texel(rgb), "{p:?}");
         }
         assert_eq!(texels.colours.len(), 4);
     }
 
-    /// Of a colour in daylight: by D65 it comes back, to the 2e-4 of the upsampling times its largest channel. At most one nothing
+    /// Of a colour in daylight: by D65 it comes back, to the 2e-4 of the upsampling times the factor. From 1e-2 to one nothing
     /// is scaled.
     #[test]
-    fn colours_above_one_are_a_reflectance_times_their_largest_channel() {
-        for rgb in [[5.0, 2.0, 0.5], [1e6, 1e6, 1e6], [0.9, 0.2, 0.5], [1.0, 0.0, 0.0]] {
+    fn colours_above_one_and_dim_ones_are_a_reflectance_times_a_factor() {
+        for (rgb, factor) in [
+            ([5.0, 2.0, 0.5], 5.0),
+            ([1e6, 1e6, 1e6], 1e6),
+            ([0.9, 0.2, 0.5], 1.0),
+            ([1.0, 0.0, 0.0], 1.0),
+            ([0.02, 0.002, 0.002], 1.0),
+            ([9e-3, 9e-4, 9e-4], 1.8e-2),
+            ([1e-7, 1e-8, 1e-8], 2e-7),
+            ([0.0; 3], 1.0),
+        ] {
             let texel = colour_texel(rgb, Carried::Spectra);
-            let largest = rgb[0].max(rgb[1]).max(rgb[2]);
-            assert_eq!(texel.scale, largest.max(1.0));
+            assert!((texel.scale - factor).abs() <= 1e-6 * factor, "{rgb:?}: {}", texel.scale);
             let light = Spectrum::Sigmoid { c: texel.coefficients, scale: texel.scale }.times(&illuminant::d65());
             let found = colour::times(ColourSpace::Rec709.matrix_from_xyz(), observer::tristimulus(&light));
             for (found, expected) in found.into_iter().zip(rgb) {
                 // White itself is off by 3e-4: see `upsample`.
-                assert!((found - f64::from(expected)).abs() < 5e-4 * f64::from(largest), "{rgb:?}: {found} {expected}");
+                assert!((found - f64::from(expected)).abs() < 5e-4 * f64::from(factor), "{rgb:?}: {found} {expected}");
             }
         }
     }

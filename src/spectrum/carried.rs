@@ -99,6 +99,22 @@ impl Carried {
         }
     }
 
+    /// Coefficients and a factor of a texel's reflectance. Of a colour above one that is its largest channel, so that there is no step at
+    /// one; of a dim one twice that, as of light: the spectrum that is that dark by itself is light at one end of the band, where
+    /// nobody sees it, and takes many steps to find.
+    #[must_use]
+    pub fn texel(self, rgb: [f32; 3]) -> ([f32; 3], f32) {
+        /// Some 25 of the 255 levels of sRGB.
+        const DIM: f32 = 0.01;
+        let largest = rgb.into_iter().fold(0.0, f32::max);
+        let scale = match largest {
+            x if x > 1.0 => x,
+            x if x > 0.0 && x < DIM => 2.0 * x,
+            _ => 1.0,
+        };
+        (self.coefficients(rgb.map(|x| x / scale)), scale)
+    }
+
     /// Coefficients and scale of a texel's light, as [`upsample::emission_coefficients`].
     #[must_use]
     pub fn emission_coefficients(self, rgb: [f32; 3]) -> ([f32; 3], f32) {

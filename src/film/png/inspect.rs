@@ -16,7 +16,7 @@ pub struct PngFacts {
     pub bits: u8,
     /// `grey`, `RGB`, `indexed`, `grey and alpha`, `RGBA`.
     pub channels: &'static str,
-    /// What its numbers mean, by the chunk that counts: cICP, iCCP, sRGB, gAMA.
+    /// What its numbers mean, by the chunk that counts: cICP, iCCP, sRGB, cHRM, gAMA.
     pub colours: String,
     /// Keywords and text.
     pub texts: Vec<(String, String)>,
@@ -100,7 +100,7 @@ fn chunks(bytes: &[u8], damaged: &mut Option<String>) -> Option<PngFacts> {
 fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
     Some(match name {
         b"cICP" => (
-            4,
+            5,
             match content {
                 [12, 13, 0, 1] => "Display P3 (cICP)".into(),
                 [1, 13, 0, 1] => format!("{SRGB} (cICP)"),
@@ -113,7 +113,8 @@ fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
             let end = content.iter().position(|b| *b == 0)?;
             (ICC, format!("{} (ICC profile)", latin1(&content[..end])))
         }
-        b"sRGB" => (2, SRGB.into()),
+        b"sRGB" => (3, SRGB.into()),
+        b"cHRM" => (2, other_primaries(content)?),
         b"gAMA" => {
             let gamma = u32::from_be_bytes(content.try_into().ok()?);
             // What writers state beside sRGB, for readers that know nothing better.
@@ -124,8 +125,19 @@ fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
     })
 }
 
+/// The primaries that a chunk cHRM states, where they are not those of sRGB to its digits: x and y of white, red, green and blue, times 10⁵.
+fn other_primaries(content: &[u8]) -> Option<String> {
+    const OF_SRGB: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
+    let words: Vec<u32> = content.as_chunks().0.iter().map(|word| u32::from_be_bytes(*word)).collect();
+    let [white, red, green, blue] = words.as_chunks::<2>().0.try_into().ok()?;
+    let place = |[x, y]: [u32; 2]| format!("{} {}", f64::from(x) / 1e5, f64::from(y) / 1e5);
+    let other = words.iter().zip(OF_SRGB).any(|(a, b)| a.abs_diff(b) > 100);
+    let [white, red, green, blue] = [white, red, green, blue].map(place);
+    other.then(|| format!("of the primaries {red}, {green}, {blue} and the white {white} (cHRM)"))
+}
+
 /// The rank of a profile.
-const ICC: i32 = 3;
+const ICC: i32 = 4;
 
 /// The colours that pictures have that do not say which.
 const SRGB: &str = "sRGB";
@@ -247,6 +259,13 @@ mod tests {
         assert_eq!(with(&[(b"cICP", &[12, 13, 0, 1]), (b"sRGB", &[0])]).unwrap(), "Display P3 (cICP)");
         assert_eq!(with(&[(b"iCCP", b"Adobe RGB (1998)\0\0")]).unwrap(), "Adobe RGB (1998) (ICC profile)");
         assert_eq!(with(&[(b"iCCP", b"GIMP built-in sRGB\0\0")]), None);
+        let primaries = |numbers: [u32; 8]| numbers.map(u32::to_be_bytes).concat();
+        let srgb = primaries([31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000]);
+        let adobe = primaries([31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000]);
+        assert_eq!(with(&[(b"gAMA", &usual), (b"cHRM", &srgb)]), None);
+        let told = "of the primaries 0.64 0.33, 0.21 0.71, 0.15 0.06 and the white 0.3127 0.329 (cHRM)";
+        assert_eq!(with(&[(b"gAMA", &usual), (b"cHRM", &adobe)]).unwrap(), told);
+        assert_eq!(with(&[(b"cHRM", &adobe[..20])]), None);
         std::fs::write(&path, &plain[..40]).unwrap();
         assert_eq!(other_colours(&path), None);
         assert_eq!(other_colours(&dir.path().join("none.png")), None);

@@ -2,10 +2,11 @@
 //!
 //! What it refuses (3.9.1): EXR files with more channels than those of colours, spectral ones among them; of PNM all but `P6`; of BMP
 //! all but 8, 24 and 32 bits without packing behind a header of 40 bytes; JPEG of four colours; TGA files without the footer of version 2, with palettes
-//! or with 16 bits. It takes other colours from palettes in BMP, which it has for grey, and from `P6` of 16 bits.
+//! or with 16 bits; Radiance files with runs of the old kind or without the line of their format; EXR files of one layer with alpha. On EXR files
+//! whose data window begins below 0 it ends. It mirrors what TGA files hold from right to left, and takes other colours from palettes in BMP, which it has for grey, and from `P6` of 16 bits.
 
 use super::decoded::{COLOURS, decode, decoder, extension, with_picture_first};
-use super::pfm;
+use super::{pfm, radiance};
 use crate::description::{PictureAnew, PictureRead};
 use crate::film::exr::{self, ChannelData, ColourEncoding, Compression, ExrImage, ExrPart, Layout};
 use crate::scene::bands::{Bands, Quantity};
@@ -33,6 +34,16 @@ fn of_others(path: &Path) -> Option<PictureRead> {
         return Some(PictureRead { coloured: pfm::is_coloured(&bytes), anew: None });
     }
     let is_plain = is_plain(&bytes);
+    if radiance::is(&bytes) && !is_plain {
+        let pixels = decode(path).ok()?.into_rgb32f();
+        let plane = |k: usize| (COLOURS[0][k], pixels.pixels().map(|pixel| pixel.0[k]).collect());
+        let primaries = ColourSpace::Rec709.chromaticities();
+        let bytes = encoded([pixels.width(), pixels.height()], [0, 1, 2].map(plane).into(), primaries)?;
+        return Some(PictureRead {
+            coloured: true,
+            anew: Some(PictureAnew { extension: "exr", bytes, loses_spectra: false }),
+        });
+    }
     let coloured = decoder(path, bytes).ok()?.color_type().has_color();
     if is_plain {
         return Some(PictureRead { coloured, anew: None });
@@ -59,11 +70,13 @@ fn is_plain(bytes: &[u8]) -> bool {
             number(14, 4) == Some(40) && matches!(number(28, 2), Some(24 | 32)) && number(30, 4) == Some(0)
         }
         [0xff, 0xd8, ..] => matches!(jpeg_components(bytes), Some(1 | 3)),
-        _ if image::guess_format(bytes).is_ok() || pfm::is(bytes) || bytes.starts_with(b"#?") => true,
+        _ if radiance::is(bytes) => radiance::is_plain(bytes),
+        _ if image::guess_format(bytes).is_ok() || pfm::is(bytes) => true,
         // TGA has nothing to tell it by at its beginning.
         _ => {
             let footer = bytes.len().checked_sub(18).is_some_and(|at| bytes[at..].starts_with(b"TRUEVISION-XFILE."));
-            footer && matches!(bytes[2], 2 | 3 | 10 | 11) && matches!(bytes[16], 8 | 24 | 32)
+            // Fifth of the bits that describe pixels: from right to left.
+            footer && matches!(bytes[2], 2 | 3 | 10 | 11) && matches!(bytes[16], 8 | 24 | 32) && bytes[17] >> 4 & 1 == 0
         }
     }
 }
@@ -102,9 +115,15 @@ fn of_exr(path: &Path) -> Option<PictureRead> {
         None => (channels_of(part)?, file.primaries(), false),
     };
     let coloured = channels.len() > 1;
+    let bytes = encoded([part.window.width, part.window.height], channels, primaries)?;
+    Some(PictureRead { coloured, anew: Some(PictureAnew { extension: "exr", bytes, loses_spectra }) })
+}
+
+/// An EXR file of these channels.
+fn encoded(size: [u32; 2], channels: Vec<(&'static str, Vec<f32>)>, primaries: [[f64; 2]; 4]) -> Option<Vec<u8>> {
     let image = ExrImage {
-        frame: [part.window.width, part.window.height],
-        window: crate::film::Window::full(part.window.width, part.window.height),
+        frame: size,
+        window: crate::film::Window::full(size[0], size[1]),
         channels: channels.into_iter().map(|(name, plane)| (name.to_owned(), ChannelData::F32(plane))).collect(),
         colour: Some(ColourEncoding { primaries, interop_id: None }),
         attributes: Vec::new(),
@@ -112,8 +131,7 @@ fn of_exr(path: &Path) -> Option<PictureRead> {
         compression: Compression::Zips,
         layout: Layout::Single,
     };
-    let bytes = exr::encode_exr(&image).ok()?;
-    Some(PictureRead { coloured, anew: Some(PictureAnew { extension: "exr", bytes, loses_spectra }) })
+    exr::encode_exr(&image).ok()
 }
 
 /// Which channels Mitsuba takes of a file whose first part it takes for the picture that is taken here; it looks at what stands
@@ -122,7 +140,10 @@ fn taken_of(file: &exr::ExrFile) -> Option<&'static [&'static str]> {
     let names = file.parts[0].channels.iter().map(|(name, _)| name.rsplit_once('.').unwrap_or(("", name)));
     let layers: BTreeSet<&str> = names.clone().map(|(layer, _)| layer).collect();
     let mut letters: Vec<String> = names.map(|(_, letter)| letter.to_ascii_uppercase()).collect();
+    let all = letters.len();
     letters.retain(|letter| letter != "A");
+    let (covers, in_layer) = (letters.len() < all, layers.iter().any(|layer| !layer.is_empty()));
+    let window = file.parts[0].window;
     letters.sort_unstable();
     let taken = |channels: &&[&str]| {
         let mut channels = channels.to_vec();
@@ -130,7 +151,8 @@ fn taken_of(file: &exr::ExrFile) -> Option<&'static [&'static str]> {
         letters == channels
     };
     let is_first = file.parts.len() == 1 || file.parts[0].channel("R").is_some();
-    TAKEN.into_iter().find(taken).filter(|_| is_first && layers.len() == 1)
+    let is_read = is_first && layers.len() == 1 && !(covers && in_layer) && window.x >= 0 && window.y >= 0;
+    TAKEN.into_iter().find(taken).filter(|_| is_read)
 }
 
 /// The channels of the picture alone, as they stand in the file.
@@ -177,13 +199,17 @@ mod tests {
     }
 
     fn exr(names: &[&str]) -> Vec<u8> {
+        exr_at([0, 0], names)
+    }
+
+    fn exr_at([x, y]: [i32; 2], names: &[&str]) -> Vec<u8> {
         let planes = names
             .iter()
             .zip(1..)
             .map(|(name, k)| ((*name).to_owned(), ChannelData::F32((0..2).map(|i| 0.125 * (k + i) as f32).collect())));
         let image = ExrImage {
             frame: [2, 1],
-            window: crate::film::Window::full(2, 1),
+            window: crate::film::Window { x, y, ..crate::film::Window::full(2, 1) },
             channels: planes.collect(),
             colour: Some(ColourEncoding::of(ColourSpace::Rec709)),
             attributes: Vec::new(),
@@ -210,9 +236,13 @@ mod tests {
     /// Mitsuba 3.9.1 says of the first that it has no known pixel format.
     #[test]
     fn channels_beside_colours_are_left_out_of_exr() {
-        for names in
-            [&["R", "G", "B", "Z"][..], &["R", "G", "B", "A", "albedo.R"], &["Y", "id.X"], &["X", "Y", "Z", "W"]]
-        {
+        for names in [
+            &["R", "G", "B", "Z"][..],
+            &["R", "G", "B", "A", "albedo.R"],
+            &["Y", "id.X"],
+            &["X", "Y", "Z", "W"],
+            &["a.R", "a.G", "a.B", "a.A"],
+        ] {
             let [read, anew] = both("a.exr", &exr(names)).unwrap_or_else(|| panic!("{names:?}"));
             assert_eq!(read, anew, "{names:?}");
         }
@@ -221,6 +251,16 @@ mod tests {
         {
             assert!(both("a.exr", &exr(names)).is_none(), "{names:?}");
         }
+    }
+
+    /// Mitsuba 3.9.1 dies of the first two.
+    #[test]
+    fn windows_before_the_frame_are_moved() {
+        for at in [[-1, 0], [0, -2]] {
+            let [read, anew] = both("a.exr", &exr_at(at, &["R", "G", "B"])).unwrap();
+            assert_eq!(read, anew, "{at:?}");
+        }
+        assert!(both("a.exr", &exr_at([1, 2], &["R", "G", "B"])).is_none());
     }
 
     /// Mitsuba 3.9.1 takes no normals from the grey ones: they have one number where it wants three.
@@ -271,11 +311,11 @@ mod tests {
         assert!(pixels.iter().flatten().all(|x| (x - 0.5).abs() < 1e-3), "{pixels:?}");
     }
 
-    /// Mitsuba 3.9.1 knows no format of the first five, and reads the low bytes of the sixth for high ones.
+    /// Mitsuba 3.9.1 knows no format of the first five, reads the low bytes of the sixth for high ones, mirrors the seventh and knows no runs of the eighth.
     #[test]
     fn what_mitsuba_reads_otherwise_of_other_pictures_is_written_anew() {
-        let tga = |kind: u8, bits: u8, footer: &[u8]| {
-            let head = [0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, bits, 0x20];
+        let tga = |kind: u8, bits: u8, from: u8, footer: &[u8]| {
+            let head = [0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, bits, from];
             [&head[..], &[10, 20, 30, 40, 50, 60][..2 * usize::from(bits / 8)], footer].concat()
         };
         let bmp = |header: u8, bits: u8, pixels: &[u8]| {
@@ -285,14 +325,17 @@ mod tests {
             file.extend(pixels);
             file
         };
+        let hdr = |pixels: &[u8]| [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 3\n", pixels].concat();
         let whole = b"\0\0\0\0\0\0\0\0TRUEVISION-XFILE.\0";
         for (name, bytes) in [
             ("a.pgm", b"P5\n2 1\n255\n\x10\xa0".to_vec()),
             ("a.pbm", b"P1\n2 1\n0 1\n".to_vec()),
             ("a.ppm", b"P3\n2 1\n255\n1 2 3 40 50 60\n".to_vec()),
-            ("a.tga", tga(2, 24, b"")),
-            ("a.tga", tga(2, 16, whole)),
+            ("a.tga", tga(2, 24, 0x20, b"")),
+            ("a.tga", tga(2, 16, 0x20, whole)),
             ("a.ppm", b"P6\n2 1\n65535\n\x01\x02\x03\x04\x05\x06\x10\x20\x30\x40\x50\x60".to_vec()),
+            ("a.tga", tga(2, 24, 0x30, whole)),
+            ("a.hdr", hdr(&[9, 8, 7, 128, 1, 1, 1, 2])),
             ("a.bmp", bmp(108, 24, &[1, 2, 3, 40, 50, 60, 0, 0])),
         ] {
             let [read, anew] = both(name, &bytes).unwrap_or_else(|| panic!("{name}"));
@@ -300,7 +343,8 @@ mod tests {
         }
         for (name, bytes) in [
             ("a.ppm", b"P6\n2 1\n255\n\x01\x02\x03\x04\x05\x06".to_vec()),
-            ("a.tga", tga(2, 24, whole)),
+            ("a.tga", tga(2, 24, 0x20, whole)),
+            ("a.hdr", hdr(&[9, 8, 7, 128, 6, 5, 4, 129, 3, 2, 1, 130])),
             ("a.bmp", bmp(40, 24, &[1, 2, 3, 40, 50, 60, 0, 0])),
             ("a.pfm", b"Pf\n2 1\n-1\n\0\0\0\0\0\0\x80\x3f".to_vec()),
         ] {

@@ -3,11 +3,13 @@
 use super::{jpeg, pfm};
 use crate::error::{Error, Result};
 use crate::film::exr;
+use crate::scene::bands::is_band;
 use image::ImageDecoder;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
 use std::io::Cursor;
+use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 
 /// The most bytes a decoded picture may take: 2 GiB.
@@ -18,9 +20,10 @@ const KINDS: &str = "a PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR picture";
 
 pub(super) fn decode(path: &Path) -> Result<image::DynamicImage> {
     let bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
-    // The decoder makes grey of what is missing.
-    if image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Jpeg) && !jpeg::is_whole(&bytes) {
-        return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
+    if image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Jpeg)
+        && let Some(fault) = jpeg::fault(&bytes)
+    {
+        return Err(Error::input(path, fault));
     }
     let fault = |e: &dyn Display| Error::input(path, format!("expected {KINDS}: {e}"));
     if pfm::is(&bytes) {
@@ -37,7 +40,9 @@ pub(super) fn decode(path: &Path) -> Result<image::DynamicImage> {
             format!("expected a picture of at most 2 GiB, found {width} x {height} pixels"),
         ));
     }
-    image::DynamicImage::from_decoder(decoder).map_err(|e| fault(&e))
+    // A damaged file that a decoder was not written for is no reason to end a batch.
+    let pixels = std::panic::catch_unwind(AssertUnwindSafe(|| image::DynamicImage::from_decoder(decoder)));
+    pixels.map_err(|_| fault(&"its decoder gave up"))?.map_err(|e| fault(&e))
 }
 
 /// What decodes the `bytes` of the picture `path`, of a kind that the decoders know; they have seen no pixel yet.
@@ -107,7 +112,7 @@ pub(super) const COLOURS: [[&str; 3]; 2] = [["R", "G", "B"], ["r", "g", "b"]];
 /// The file with the part first that has a picture. Where colours are in layers alone, they are those of the one layer that
 /// has red, green and blue, or among several those of Blender's `Combined`.
 pub(super) fn with_picture_first(mut file: exr::ExrFile) -> exr::ExrFile {
-    let is_band = |(name, _): &(String, Vec<f32>)| name.starts_with("S0.") || name.starts_with("T.");
+    let is_band = |(name, _): &(String, Vec<f32>)| is_band(name);
     let has = |part: &exr::ExrPart, before: &str, names: [&str; 3]| {
         names.iter().all(|name| part.channel(&format!("{before}{name}")).is_some())
     };

@@ -51,8 +51,8 @@ struct Field {
     element: Element,
     /// The numbers; all three are the same where there is one.
     values: Vec<[f32; 3]>,
-    /// For three numbers the coefficients of the spectra that they are upsampled to.
-    sigmoids: Vec<[f32; 3]>,
+    /// For three numbers the coefficients of the spectra that they are upsampled to, and their factors.
+    sigmoids: Vec<([f32; 3], f32)>,
     /// The vertices of each triangle, in the order that barycentric coordinates count them in.
     triangles: Vec<[u32; 3]>,
 }
@@ -66,7 +66,7 @@ impl AttributeTexture {
             3 => attribute.values.as_chunks().0.to_vec(),
             _ => attribute.values.iter().map(|&x| [x; 3]).collect(),
         };
-        let sigmoids = if three { values.iter().map(|&rgb| carried.coefficients(rgb)).collect() } else { Vec::new() };
+        let sigmoids = if three { values.iter().map(|&rgb| carried.texel(rgb)).collect() } else { Vec::new() };
         let triangles = if attribute.element == Element::Vertex { triangles.to_vec() } else { Vec::new() };
         AttributeTexture { field: Arc::new(Field { element: attribute.element, values, sigmoids, triangles }), scale }
     }
@@ -91,7 +91,10 @@ impl AttributeTexture {
             return Lanes::splat(self.triple(at).x as f32);
         }
         let all = self.weighted(at).into_iter().filter(|(_, w)| *w != 0.0);
-        let spectra = all.map(|(i, w)| upsample::eval_sigmoid(self.field.sigmoids[i], nm) * (w * self.scale) as f32);
+        let spectra = all.map(|(i, w)| {
+            let (c, factor) = self.field.sigmoids[i];
+            upsample::eval_sigmoid(c, nm) * (w * self.scale * f64::from(factor)) as f32
+        });
         spectra.fold(Lanes::ZERO, |sum, s| sum + s)
     }
 
@@ -136,7 +139,7 @@ impl AttributeTexture {
     fn spectrum(&self, i: usize) -> Spectrum {
         let scale = self.scale as f32;
         match self.field.sigmoids.get(i) {
-            Some(&c) => Spectrum::Sigmoid { c, scale },
+            Some(&(c, factor)) => Spectrum::Sigmoid { c, scale: scale * factor },
             None => Spectrum::Constant(self.field.values[i][0] * scale),
         }
     }
