@@ -38,11 +38,9 @@ impl<'a> Export<'a> {
             Projection::Perspective { .. } => None,
         };
         self.pose(half);
-        if let (Some(half), Some(lens)) = (half, lens) {
+        if let (Some(_), Some(lens)) = (half, lens) {
             self.lose("camera.lens", "none: Mitsuba's orthographic camera has no lens");
-            // It is made larger with the rest of the camera.
             let Lens { radius, focus_distance } = lens;
-            let radius = radius / half;
             self.xml.instruction(&format!("set camera.lens: {{radius: {radius}, focus_distance: {focus_distance}}}"));
         }
         if let Projection::Perspective { fov_deg, fov_axis } = projection {
