@@ -135,6 +135,121 @@ fn moments_are_as_many_as_pixels_of_planes_and_skies_that_are_passed() {
     }
 }
 
+/// What comes back to where it was has been on its way: a ball that goes once around at 1.6 m, eight pixels a metre, the outermost corner of
+/// whose box goes 84 of them; the blades of a fan, a quarter of a turn of 1 m at 29 pixels a metre, 46. Of what light and pictures do nobody knows how far it goes.
+#[test]
+fn moments_are_as_many_as_pixels_of_ways_that_are_not_straight() {
+    let camera = |height: f64| {
+        format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: {height}, shutter: 1}}\n\
+             image: {{width: 64, height: 64}}\nrender: {{samples: 1, frames: 0}}\n\
+             output: {{exr: {{precision: float, channels: luminance}}}}\n"
+        )
+    };
+    let turn =
+        |degrees: u32| format!("transform: [{{rotate: {{axis: [0, 0, 1], deg: {{-1: -{degrees}, 1: {degrees}}}}}}}]");
+    let orbit = format!("shapes: [{{sphere: {{radius: 0.08, center: [1.6, 0, 0], emission: 1, {}}}}}]\n", turn(360));
+    let fan = format!(
+        "groups: {{fan: [rectangle: {{corner: [-1, -0.01, 0], edge_u: [2, 0, 0], edge_v: [0, 0.02, 0]}}]}}\n\
+         shapes: [{{instance: {{group: fan, {}}}}}]\nlights: [{{constant: {{radiance: 1}}}}]\n",
+        turn(90)
+    );
+    let wall = "shapes: [{plane: {normal: [0, 0, 1]}}]\n";
+    let sweep = format!(
+        "{wall}lights: [{{spot: {{position: [0, 0, 4], target: {{-1: [-4, 0, 0], 1: [4, 0, 0]}}, cutoff_deg: 1, intensity: 30}}}}]\n"
+    );
+    let slide = format!(
+        "textures: {{b: {{image: {{file: sky.pgm, offset: {{-1: [0.8, 0], 1: [-0.8, 0]}}}}}}}}\n\
+         {wall}materials: {{m: {{diffuse: {{reflectance: {{texture: b}}}}}}}}\nlights: [{{constant: {{radiance: 1}}}}]\n"
+    )
+    .replace("normal: [0, 0, 1]", "normal: [0, 0, 1], material: m");
+    // Legs of an eighth of the way are straight: 8 sin(π/8) / π of a whole turn, which is 82 pixels.
+    for (height, scene, said) in [
+        (8.0, &orbit, "64 moments: what moves travels 82 pixels"),
+        (2.2, &fan, "46 moments: what moves travels 46 pixels"),
+        (4.0, &sweep, "64 moments: lamps or textures move"),
+        (4.0, &slide, "64 moments: lamps or textures move"),
+    ] {
+        let (_, report) = render(&(camera(height) + scene), &[]);
+        assert!(effect(&report).ends_with(said), "{}", effect(&report));
+    }
+}
+
+/// For how long the shutter is open, and at how many moments, is said for the frame.
+#[test]
+fn a_keyed_shutter_is_that_of_its_frame() {
+    let moments = |shutter: &str, x: &str| {
+        let scene =
+            ortho(x, shutter) + FRAME + "lights: [{constant: {radiance: 1}}]\nshapes: [{sphere: {radius: 1}}]\n";
+        effect(&render(&scene, &["--spp", "1"]).1)
+    };
+    assert_eq!(moments("{0: 0.25, 8: 0.75}", "0"), "false nothing changes while the shutter is open");
+    let said = moments("{open: -0.5, close: 0.5, moments: {0: 16, 8: 32}}", "{0: 0, 8: 1}");
+    assert_eq!(said, "true camera.shutter, 1 of a frame at 24 moments: as the scene says");
+}
+
+/// The channels of a scene, by name.
+fn planes(scene: &str) -> std::collections::BTreeMap<String, Vec<f32>> {
+    let place = Place::with(&[("scene.yaml", scene), ("sky.pgm", "P2 2 1 255\n0 255\n")]);
+    let ran = place.run(&["render", "scene.yaml", "-q", "-o", "out.exr"]);
+    assert_eq!(ran.code, 0, "{}\n{scene}", ran.err);
+    let floats = |bits: Vec<u32>| bits.into_iter().map(f32::from_bits).collect();
+    pixels(&place.path("out.exr")).into_iter().map(|(name, bits)| (name, floats(bits))).collect()
+}
+
+/// A lamp of no group that is dark at the frame and flashes while the shutter is open has its layer there, and what the groups have is the
+/// picture, to roundings of f32.
+#[test]
+fn lamps_that_are_dark_at_the_frame_have_their_layer() {
+    let scene = |shutter: &str| {
+        format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 30, shutter: {shutter}}}\n\
+             image: {{width: 8, height: 8}}\nrender: {{frames: 0, samples: 16}}\noutput: {{exr: {{precision: float}}}}\n\
+             light_groups: {{key: [k]}}\nlayers: [light_groups]\nshapes: [{{sphere: {{radius: 1}}}}]\nlights:\n\
+             - point: {{name: k, position: [3, 3, 3], intensity: 3}}\n\
+             - point: {{name: flash, position: [-3, 3, 3], intensity: {{0: 0, 0.5: 20}}}}\n"
+        )
+    };
+    let (blurred, still) = (planes(&scene("1")), planes(&scene("null")));
+    assert!(blurred.keys().eq(still.keys()), "{:?}", still.keys());
+    for (i, all) in blurred["G"].iter().enumerate() {
+        let parts = blurred["light_key.G"][i] + blurred["light_default.G"][i];
+        assert!((parts - all).abs() <= 1e-6 * all, "{parts} {all}");
+    }
+    assert!(blurred["light_default.G"].iter().any(|g| *g > 0.0) && still["light_default.G"].iter().all(|g| *g == 0.0));
+}
+
+/// A ball of metal that is smooth at the frame and rough at all moments of the shutter throws no caustic.
+#[test]
+fn what_is_sharp_is_told_at_each_moment() {
+    let caustic = |rough: &str| {
+        let found = planes(&format!(
+            "camera: {{origin: [0, 2, 5], target: [0, 0, 0], fov_deg: 40, shutter: {{open: 0, close: 4, moments: 4}}}}\n\
+             image: {{width: 8, height: 8}}\nrender: {{frames: 0, samples: 16}}\noutput: {{exr: {{precision: float}}}}\n\
+             layers: [caustic]\nlights: [{{constant: {{radiance: 1}}}}]\nshapes:\n- plane: {{point: [0, -1, 0], normal: [0, 1, 0]}}\n\
+             - sphere: {{radius: 1, material: {{conductor: {{metal: Au, roughness: {rough}}}}}}}\n"
+        ));
+        found["caustic.G"].iter().sum::<f32>()
+    };
+    assert_eq!(caustic("{0: 0, 0.25: 0.5}"), 0.0);
+    assert!(caustic("{0: 0.5, 0.25: 0}") > 0.0);
+}
+
+/// The sky turns by 9° to the next frame, whether another light from everywhere is dark there or not.
+#[test]
+fn the_motion_of_a_sky_is_its_own() {
+    let motion = |end: &str| {
+        let found = planes(&format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 8, height: 8}}\nintegrator: none\n\
+             layers: [motion]\nrender: {{frames: 0, samples: 1}}\noutput: {{exr: {{precision: float}}}}\nlights:\n\
+             - constant: {{radiance: {{0: 0.1, 1: {end}}}}}\n- environment: {{file: sky.pgm, rotate_deg: {{0: 0, 10: 90}}}}\n"
+        ));
+        found["motion.X"].clone()
+    };
+    let found = motion("0");
+    assert!(found == motion("0.05") && found.iter().all(|x| x.abs() > 1.0), "{found:?}");
+}
+
 /// A point lamp, a ball of glass and a floor, with whatever else.
 fn caustic(eye: &str, lamp: &str, ball: &str, further: &str) -> String {
     format!(
@@ -257,6 +372,8 @@ fn a_shutter_that_cannot_be_is_refused() {
         says("180").contains("camera.shutter: expected at most 8 frames (a shutter of 180° is 0.5), or when it opens")
     );
     assert!(says("180").contains(", found 180"), "{}", says("180"));
+    let far = says("{open: -8e307, close: 8e307}");
+    assert!(far.contains("camera.shutter.open: expected a number of frames from -1e9 to 1e9, found -8e307"), "{far}");
     assert!(says("{open: 1, close: 0}").contains("camera.shutter: expected open before close, found 1 and 0"));
     assert!(
         says("{open: 0, close: 1, moments: 1}")

@@ -6,10 +6,10 @@ use crate::description::{self, DEFAULT_GROUP, LayerContent, SceneDescription};
 use crate::error::Result;
 use crate::film::layers::Kept;
 use crate::scene::Scene;
-use crate::scene::casters::Casters;
 use crate::transport::layers::{Form, Layer, LayerPlan, Source};
 use crate::transport::middle::Middle;
 use crate::transport::ways::{Way, Ways};
+use std::collections::BTreeSet;
 
 /// Whether standard errors are to be written, as a setting of the file or as a layer.
 pub(super) fn wants_errors(description: &SceneDescription) -> bool {
@@ -49,9 +49,11 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
                 plan.layers.push(Layer { name: layer.name.clone(), source, squares: None });
             }
             LayerContent::LightGroups => {
-                // Depth fog is of no lamp.
+                // Of lamps that are dark at this frame, too, so that all frames have the same; depth fog is of no lamp.
                 let is_named = description.light_groups.contains_key(DEFAULT_GROUP);
-                let has_rest = is_named || groups.of.contains(&0) || scene.fog.is_some();
+                let grouped: BTreeSet<&String> = description.light_groups.values().flatten().collect();
+                let has_rest =
+                    is_named || !description.lamps().iter().all(|lamp| grouped.contains(lamp)) || scene.fog.is_some();
                 let rest = has_rest.then(|| DEFAULT_GROUP.to_owned());
                 let numbers = if rest.is_some() { 0 } else { 1 }..groups.count();
                 for (name, i) in rest.iter().chain(&groups.names).zip(numbers) {
@@ -61,9 +63,6 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
             }
             _ => {}
         }
-    }
-    if plan.parts_light() {
-        plan.sharp = Casters::of(scene, &[]).casts;
     }
     plan.mattes = description.layers.iter().any(|layer| matches!(layer.content, LayerContent::Matte(_)));
     for layer in &description.layers {

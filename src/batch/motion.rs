@@ -8,19 +8,20 @@
 use super::prepare::hash_text;
 use crate::description::{SceneDescription, ShutterTimes};
 use crate::error::Result;
-use crate::scene::bvh::Aabb;
 use crate::scene::census::Census;
 use crate::scene::compile;
 use crate::scene::curves::Curves;
+use crate::scene::light::Light;
 use crate::scene::shelf::Shelf;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Object, Scene};
 use crate::transport::middle;
 use crate::transport::plan::{Effect, Integrator};
-use glam::{DMat4, DVec2, DVec3, DVec4};
+use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4};
 use std::collections::HashSet;
+use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Moments where little moves: what turns in its place moves by no more than this tells.
+/// Moments where little moves.
 const LEAST: u32 = 16;
 /// Moments where much does.
 const MOST: u32 = 64;
@@ -30,6 +31,10 @@ const BYTES: usize = 16_000_000 * TRIANGLE;
 const TRIANGLE: usize = 130;
 /// Places along each side of the picture at which planes and skies are looked at.
 const PLACES: u32 = 5;
+/// Parts of the time in which the shutter is open, over which ways are added up: what turns may end where it was.
+const LEGS: u32 = 8;
+/// So many vertices of a mesh are followed at the most.
+const MARKS: usize = 64;
 
 /// The scene while the shutter is open.
 #[derive(Debug, Default)]
@@ -71,13 +76,31 @@ pub fn moments(
     let (count, why) = match wanted {
         Some(count) => (count, "as the scene says".to_owned()),
         None => {
-            let mut at = |time| compile::compile_with(&motion.at(time)?, name, shelf);
-            let (open, close) = (at(open)?, at(close)?);
-            let way = travelled(&open, &close);
-            let (triangles, curves) = (Census::of(still).triangles, moving_curves(&open, &close));
-            let count = (way.round() as u32).clamp(LEAST, MOST);
+            let mut at = |part: f64| -> Result<(SceneDescription, Scene)> {
+                let described = motion.at(open + (close - open) * part)?;
+                let scene = compile::compile_with(&described, name, shelf)?;
+                Ok((described, scene))
+            };
+            let (first, last) = (at(0.0)?, at(1.0)?);
+            let (triangles, curves) = (Census::of(still).triangles, moving_curves(&first.1, &last.1));
             let fits = moments_that_fit(triangles, curves);
-            let what = format!("what moves travels {way:.0} pixels");
+            // How far a way is counts where there is room.
+            let legs = if fits > LEAST { LEGS } else { 1 };
+            let mut ways = Ways::default();
+            let mut slides = false;
+            let mut before = None;
+            for leg in 1..=legs {
+                let after = if leg == legs { None } else { Some(at(f64::from(leg) / f64::from(legs))?) };
+                let [from, to] = [before.as_ref().unwrap_or(&first), after.as_ref().unwrap_or(&last)];
+                ways.add(&first.1, &from.1, &to.1);
+                slides |= poses(&from.1) != poses(&to.1) || differ(&from.0.textures, &to.0.textures);
+                before = after;
+            }
+            let way = ways.longest(still);
+            let (count, what) = match slides {
+                true => (MOST, "lamps or textures move".to_owned()),
+                false => ((way.round() as u32).clamp(LEAST, MOST), format!("what moves travels {way:.0} pixels")),
+            };
             if count > fits {
                 let curves = if curves == 0 { String::new() } else { format!(", curves of {} MB", curves / 1_000_000) };
                 (fits, format!("{what}; each has {triangles} triangles{curves}"))
@@ -120,29 +143,93 @@ fn moments_that_fit(triangles: usize, curves: usize) -> u32 {
     (BYTES / (triangles * TRIANGLE + curves).max(1)).clamp(2, MOST as usize) as u32
 }
 
-/// The longest way between two moments, pixels, of the corner of a box, and of what has no end at places that are spread over
-/// the picture. What is behind the camera does not count, nor what is there at one of them only.
-fn travelled(open: &Scene, close: &Scene) -> f64 {
-    let size = DVec2::from(open.camera.resolution.map(f64::from));
-    let places = |scene: &Scene, bounds: &Aabb| -> Vec<Option<DVec2>> {
-        let ndc_from_world = DMat4::from_cols_array(&scene.camera.ndc_from_world().map(f64::from));
-        let corner = |i: u32| {
-            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-            let at = ndc_from_world * DVec4::from((DVec3::new(pick(0), pick(1), pick(2)), 1.0));
-            (at.w > 0.0 && at.is_finite()).then(|| DVec2::new(at.x, at.y) / at.w * size)
-        };
-        (0..8).map(corner).collect()
+/// Where lamps without a surface stand, whither they shine, and how they are turned about that: nobody knows what moves on the
+/// picture with them.
+fn poses(scene: &Scene) -> Vec<[DVec3; 3]> {
+    let pose = |light: &Light| match light {
+        Light::Point { position, .. } => Some([*position, DVec3::ZERO, DVec3::ZERO]),
+        Light::Spot { position, axis, .. } => Some([*position, *axis, DVec3::ZERO]),
+        Light::Directional { direction, .. } => Some([DVec3::ZERO, *direction, DVec3::ZERO]),
+        Light::Projector(projector) => Some(projector.pose()),
+        _ => None,
     };
-    // No further than across the picture: beyond it nobody looks.
-    let across = size.length();
-    let pairs = open.objects.iter().zip(&close.objects);
-    let ways = pairs.flat_map(|(a, b)| {
-        let (from, to) = (places(open, &a.bounds()), places(close, &b.bounds()));
-        from.into_iter().zip(to).filter_map(|(from, to)| Some((to? - from?).length())).collect::<Vec<_>>()
-    });
-    let spread = |i: u32| (DVec2::new(f64::from(i % PLACES), f64::from(i / PLACES)) + 0.5) / f64::from(PLACES);
-    let endless = (0..PLACES * PLACES).filter_map(|i| middle::passes(open, close, spread(i) * size));
-    ways.chain(endless).fold(0.0, f64::max).min(across)
+    scene.lights.iter().filter_map(pose).collect()
+}
+
+fn differ<T: Debug>(a: &T, b: &T) -> bool {
+    format!("{a:?}") != format!("{b:?}")
+}
+
+/// How far things travel on the picture, pixels: of each thing points that stand for it, and of what has no end places that are
+/// spread over the picture. What is behind the camera does not count, nor what is there at one moment only.
+#[derive(Default)]
+struct Ways {
+    things: Vec<Vec<f64>>,
+    endless: [f64; (PLACES * PLACES) as usize],
+}
+
+impl Ways {
+    /// Adds the way from one moment to another, of what there is in `first`.
+    fn add(&mut self, first: &Scene, from: &Scene, to: &Scene) {
+        let size = DVec2::from(first.camera.resolution.map(f64::from));
+        let places = |scene: &Scene, i: usize| -> Vec<Option<DVec2>> {
+            let ndc_from_world = DMat4::from_cols_array(&scene.camera.ndc_from_world().map(f64::from));
+            let place = |point: DVec3| {
+                let at = ndc_from_world * DVec4::from((point, 1.0));
+                (at.w > 0.0 && at.is_finite()).then(|| DVec2::new(at.x, at.y) / at.w * size)
+            };
+            marks(&first.objects[i], &scene.objects[i]).into_iter().map(place).collect()
+        };
+        let count = first.objects.len().min(from.objects.len()).min(to.objects.len());
+        self.things.resize(first.objects.len(), Vec::new());
+        for (i, ways) in self.things.iter_mut().enumerate().take(count) {
+            let (from, to) = (places(from, i), places(to, i));
+            ways.resize(from.len().max(ways.len()), 0.0);
+            for (way, ends) in ways.iter_mut().zip(from.into_iter().zip(to)) {
+                if let (Some(from), Some(to)) = ends {
+                    *way += (to - from).length();
+                }
+            }
+        }
+        for (way, i) in self.endless.iter_mut().zip(0..) {
+            let place = (DVec2::new(f64::from(i % PLACES), f64::from(i / PLACES)) + 0.5) / f64::from(PLACES);
+            *way += middle::passes(from, to, place * size).unwrap_or(0.0);
+        }
+    }
+
+    /// The longest of all; no further than across the picture of `scene`: beyond it nobody looks.
+    fn longest(&self, scene: &Scene) -> f64 {
+        let across = DVec2::from(scene.camera.resolution.map(f64::from)).length();
+        self.things.iter().flatten().chain(&self.endless).copied().fold(0.0, f64::max).min(across)
+    }
+}
+
+/// Points in the world that stand for a thing that was `first` and is `now`, the same ones at all moments: corners of its first box
+/// that are carried as the thing is, or vertices.
+fn marks(first: &Object, now: &Object) -> Vec<DVec3> {
+    let bounds = first.bounds();
+    let corner = |i: u32| {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    let carried = |from: DAffine3, to: DAffine3| {
+        let carry = to * from.inverse();
+        (0..8).map(|i| carry.transform_point3(corner(i))).collect()
+    };
+    match (&first.geometry, &now.geometry) {
+        (Geometry::Shape(from), Geometry::Shape(to)) => carried(from.placement(), to.placement()),
+        (Geometry::Sdf(from), Geometry::Sdf(to)) => carried(from.placement(), to.placement()),
+        (Geometry::Curves(from), Geometry::Curves(to)) => carried(from.placement(), to.placement()),
+        (Geometry::Instance(from), Geometry::Instance(to)) => {
+            carried(*from.map.world_from_object(), *to.map.world_from_object())
+        }
+        (Geometry::Mesh(_), Geometry::Mesh(to)) => {
+            let positions = &to.mesh.positions;
+            let step = positions.len().div_ceil(MARKS).max(1);
+            positions.iter().step_by(step).map(|p| to.mesh.origin + DVec3::from(p.map(f64::from))).collect()
+        }
+        _ => Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, SAMPLES_LIMIT};
 use crate::film::filter::{Filter, FilterSampler};
 use crate::scene::Scene;
+use crate::scene::casters::Casters;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
@@ -162,7 +163,9 @@ pub(super) fn spare_whitted(description: &mut SceneDescription, entry: &BatchEnt
 pub(super) fn check_stop(description: &SceneDescription) -> Result<()> {
     let whitted = matches!(description.integrator, description::Integrator::Whitted(_));
     match whitted && stop(description).is_open() {
-        true => Err(Error::Config("render.stop: whitted has no noise: its time and its error are given".into())),
+        true => Err(Error::Config(
+            description.fault("render.stop", "whitted has no noise: its time and its error are given"),
+        )),
         false => Ok(()),
     }
 }
@@ -206,6 +209,11 @@ pub(super) fn prepare_scene(
     moments.iter_mut().for_each(|moment| moment.length_exponent = scene.length_exponent);
     let census = motion::census(&scene, &moments);
     let layers = layers::plan(&description, &scene, planned)?;
+    if layers.parts_light() {
+        for scene in moments.iter_mut().chain([&mut scene]) {
+            scene.sharp = Casters::of(scene, &[]).casts;
+        }
+    }
     let mut plan = EffectPlan::of(&census, integrator, layers, mode);
     plan.effects.extend(blur.said);
     if matches!(plan.integrator, Integrator::Depth) {

@@ -43,6 +43,11 @@ fn frame_of(text: &str) -> Option<f64> {
     text.parse().ok().filter(|frame: &f64| number && frame.is_finite())
 }
 
+/// Whether the node at `at` is one value over frames.
+pub(crate) fn is_keyed_at(node: &Node, at: At<'_>) -> bool {
+    is_keyed(node) && !NAMES.contains(&path::display(&at.segments()).as_str())
+}
+
 /// Whether a node is keyed, or meant to be. A number without value is no frame, but most likely behind a decimal comma: in
 /// `{radius: 0,5}` it is a field that nobody knows.
 pub(crate) fn is_keyed(node: &Node) -> bool {
@@ -60,7 +65,7 @@ fn each(root: &mut Node, change: &mut dyn FnMut(&mut Node) -> Result<(), Fault>)
         at: At<'_>,
         change: &mut dyn FnMut(&mut Node) -> Result<(), Fault>,
     ) -> Result<(), Fault> {
-        if is_keyed(node) && !NAMES.contains(&path::display(&at.segments()).as_str()) {
+        if is_keyed_at(node, at) {
             return change(node);
         }
         match &mut node.value {
@@ -194,6 +199,15 @@ pub(crate) fn evaluate_within(root: &mut Node, frame: f64, time: f64) -> Result<
     let Value::Map(entries) = &mut root.value else { return Ok(()) };
     for entry in entries.iter_mut().filter(|entry| STILL.contains(&entry.key.as_str())) {
         entry.node = section(entry, frame)?;
+    }
+    // For how long the shutter is open does not change meanwhile.
+    for entry in entries.iter_mut().filter(|entry| entry.key == "camera") {
+        let Value::Map(fields) = &entry.node.value else { continue };
+        let Some(i) = fields.iter().position(|field| field.key == "shutter") else { continue };
+        let alone = Entry { node: Node::new(entry.node.place, Value::Map(vec![fields[i].clone()])), ..entry.clone() };
+        if let (Value::Map(mut found), Value::Map(fields)) = (section(&alone, frame)?.value, &mut entry.node.value) {
+            fields[i] = found.remove(0);
+        }
     }
     evaluate(root, time)
 }
@@ -512,7 +526,7 @@ mod tests {
         let root = at(text, 1.0).unwrap();
         let printed = |key: &str| {
             let sources = Sources::default();
-            super::super::print::Printer { sources: &sources, directory: Path::new("") }.flow(root.get(key).unwrap())
+            super::super::print::Printer::new(&sources, Path::new("")).flow(root.get(key).unwrap())
         };
         assert_eq!(printed("x"), "[1, 1, 1]");
         assert_eq!(printed("y"), "[[[0.5, 0.5], [0.5, 0.5]]]");

@@ -231,6 +231,14 @@ impl SceneDescription {
         }
     }
 
+    /// The names of all lamps, dark ones too: shapes that shine, and lights.
+    #[must_use]
+    pub fn lamps(&self) -> Vec<String> {
+        let shining = self.shapes.iter().enumerate().filter(|(_, shape)| shape.emission.is_some());
+        let lights = self.lights.iter().enumerate().map(|(i, light)| light.name_or_kind(i));
+        shining.map(|(i, shape)| shape.name_or_kind(i)).chain(lights).collect()
+    }
+
     /// Light groups and assets name what is there, each thing once.
     fn check_names(&self, checker: &mut Checker<'_>) {
         // Mattes, assets and groups of lamps go by name.
@@ -239,14 +247,9 @@ impl SceneDescription {
         if named {
             self.check_names_of_their_own(checker);
         }
-        let shapes = |shining: bool| {
-            let all = self.shapes.iter().enumerate().filter(move |(_, shape)| !shining || shape.emission.is_some());
-            all.map(|(i, shape)| shape.name_or_kind(i))
-        };
-        let lamps: Vec<String> =
-            shapes(true).chain(self.lights.iter().enumerate().map(|(i, light)| light.name_or_kind(i))).collect();
-        let shapes: Vec<String> = shapes(false).collect();
-        let all = [("light_groups", "lamp", &self.light_groups, lamps), ("assets", "shape", &self.assets, shapes)];
+        let shapes = self.shapes.iter().enumerate().map(|(i, shape)| shape.name_or_kind(i)).collect();
+        let all =
+            [("light_groups", "lamp", &self.light_groups, self.lamps()), ("assets", "shape", &self.assets, shapes)];
         // Light is parted by numbers of eight bits; mattes go by names.
         let (most, groups) = (usize::from(u8::MAX) - 1, self.light_groups.len());
         checker.require(groups <= most, At::ROOT.key("light_groups"), "at most 254 names", groups);

@@ -333,6 +333,7 @@ impl<'a> Compiler<'a> {
             has_sky: d.lights.iter().any(written::Light::is_around),
             dark,
             light_groups: lights::groups(d, &light_names),
+            sharp: Vec::new(),
             wavelengths,
             bands,
             center,

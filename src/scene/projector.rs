@@ -36,6 +36,12 @@ pub struct Cone {
 }
 
 impl Projector {
+    /// Where it stands, whither it shines, and what is right on its picture.
+    #[must_use]
+    pub fn pose(&self) -> [DVec3; 3] {
+        [self.position, self.axes.z_axis, self.axes.x_axis]
+    }
+
     /// A projector that throws a picture `half` wide and high, to each side, at distance one. With a negative
     /// height v grows downward.
     #[must_use]

@@ -98,9 +98,6 @@ pub struct LayerPlan {
     pub sample_distance: f64,
     /// Whether it is noted who covers the pixels.
     pub mattes: bool,
-    /// Of each object whether what it throws onto others is a caustic, where light is parted: mirrors, and glass and metal that are
-    /// smooth or nearly so, as paths from the lights take them. Whether those are used changes nothing about it.
-    pub sharp: Vec<bool>,
     /// Whose samples share a sum.
     pub kept: Kept,
 }
@@ -119,7 +116,6 @@ impl Default for LayerPlan {
             distances: false,
             sample_distance: 1.0,
             mattes: false,
-            sharp: Vec::new(),
             kept: Kept::Together,
         }
     }

@@ -7,6 +7,7 @@ use super::plan::{EffectPlan, Integrator};
 use super::shadow::MAX_BOUNDARIES;
 use crate::math::Ray;
 use crate::scene::compound::{Turns, Vertex};
+use crate::scene::environment::Environment;
 use crate::scene::light::Light;
 use crate::scene::material::Kind;
 use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
@@ -118,13 +119,17 @@ pub fn passes(scene: &Scene, next: &Scene, place: DVec2) -> Option<f64> {
 /// Where what is infinitely far in `direction` is seen in the scene `next`: there still, or of the first picture of a sky in the
 /// same place of it.
 fn turned(scene: &Scene, next: &Scene, direction: DVec3) -> DVec3 {
-    let skies = scene.backgrounds.iter().zip(&next.backgrounds);
-    let mut maps =
-        skies.filter_map(|(&here, &there)| match (&scene.lights[here as usize], &next.lights[there as usize]) {
-            (Light::Environment(here), Light::Environment(there)) => Some((here, there)),
+    // Other light from infinity may be dark in one of both.
+    fn map(scene: &Scene) -> Option<&Environment> {
+        scene.backgrounds.iter().find_map(|&i| match &scene.lights[i as usize] {
+            Light::Environment(map) => Some(&**map),
             _ => None,
-        });
-    maps.next().map_or(direction, |(here, there)| here.carried(there, direction))
+        })
+    }
+    match (map(scene), map(next)) {
+        (Some(here), Some(there)) => here.carried(there, direction),
+        _ => direction,
+    }
 }
 
 /// Where the point that was hit is in the scene `next`: at the same place of the same triangle, or of the same form. What

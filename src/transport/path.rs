@@ -295,7 +295,7 @@ impl Tracer<'_> {
             path.sharp = caustics.is_sharp(hit.object);
         }
         if let Some(ledger) = self.ledger {
-            ledger.meet(self.plan.layers.sharp[hit.object as usize]);
+            ledger.meet(self.scene.sharp[hit.object as usize]);
         }
         let choice = Choice { sampler: self.sampler, vertex: path.vertices, drawn: Cell::new(None) };
         let leaving = Leaving {

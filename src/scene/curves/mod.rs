@@ -72,6 +72,12 @@ pub struct Curves {
 }
 
 impl Curves {
+    /// From the control points as written to the world.
+    #[must_use]
+    pub fn placement(&self) -> DAffine3 {
+        self.placement
+    }
+
     /// Curves in the world. Radii are not transformed.
     ///
     /// # Errors
