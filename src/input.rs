@@ -26,6 +26,12 @@ pub fn check(path: &Path) -> Result<()> {
     Err(Error::other(format!("expected a regular file, found {found}")))
 }
 
+/// Whether another process would find something else at `path`, or nothing.
+#[must_use]
+pub fn is_of_this_process(path: &Path) -> bool {
+    ["/dev/stdin", "/dev/fd", "/proc"].iter().any(|own| path.starts_with(own))
+}
+
 /// Opens a regular file.
 ///
 /// # Errors

@@ -88,6 +88,13 @@ fn samples_of_the_command_line_bound_the_stop_of_the_file() {
     assert_eq!(eight, hash("--set render.samples=8"));
     assert_eq!(eight, hash("--set render.stop.samples=8"));
     assert_ne!(eight, hash("--spp 12"));
+    let place = Place::of(&SCENE.replace("samples: 16", "samples: 16, stop: {error: 1e-5}"));
+    for spelt in ["8.0", "8e0", "0x8", "+8"] {
+        assert_eq!(abbe(&place, &format!("render scene.yaml -q -o a.exr --set render.samples={spelt}")).0, 0);
+        assert_eq!(place.json("report.json")["scenes"][0]["samples"], 8, "{spelt}");
+    }
+    assert_eq!(abbe(&place, "render scene.yaml -q -o a.exr --set \"render\".samples=8").0, 0);
+    assert_eq!(place.json("report.json")["scenes"][0]["samples"], 8);
 }
 
 /// A time or an error for all scenes is none for those by `whitted`; one of their own is refused.
@@ -114,11 +121,15 @@ fn targets_of_a_batch_pass_over_scenes_without_noise() {
     batch("", ", render.stop.error: 0.2");
     let (code, said) = abbe(&place, "render batch.yaml -q -o .");
     assert!(code == 2 && said.contains("whitted has no noise: its time"), "{code} {said}");
+    // A field without value is not written.
+    batch("render: {stop: null}\n", ", render.stop.error: 0.2");
+    let (code, said) = abbe(&place, "render batch.yaml -q -o .");
+    assert!(code == 2 && said.contains("render.stop: whitted has no noise"), "{code} {said}");
     batch("", "");
     assert_eq!(abbe(&place, "render batch.yaml -q -o . --error 20% --scene w").0, 2);
     // Each task would end so.
     let (code, said) = abbe(&place, "farm batch.yaml -q --format slurm -o other --set render.stop.error=0.2");
-    assert!(code == 2 && said.contains("w: render.stop: whitted has no noise"), "{code} {said}");
+    assert!(code == 2 && said.contains("render.stop: whitted has no noise"), "{code} {said}");
 }
 
 #[test]

@@ -81,8 +81,7 @@ pub(super) fn attributes(
         all.push((name.clone(), value));
     }
     if let Some(counts) = &report.adaptive {
-        let counts = format!("least {}, mean {:.1}, most {}", counts.least, counts.mean, counts.most);
-        all.push(("abbe/adaptiveSamples".to_owned(), text(&counts)));
+        all.push(("abbe/adaptiveSamples".to_owned(), text(&counts.words())));
     }
     if let Some(e) = error {
         all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));

@@ -127,6 +127,19 @@ impl SampleCounts {
         }
         SampleCounts { least, mean: all as f64 / film.cells().len().max(1) as f64, most }
     }
+
+    /// As a header says them.
+    #[must_use]
+    pub fn words(&self) -> String {
+        format!("least {}, mean {:.1}, most {}", self.least, self.mean, self.most)
+    }
+
+    /// What [`SampleCounts::words`] says.
+    fn read(words: &str) -> Option<SampleCounts> {
+        let (least, rest) = words.strip_prefix("least ")?.split_once(", mean ")?;
+        let (mean, most) = rest.split_once(", most ")?;
+        Some(SampleCounts { least: least.parse().ok()?, mean: mean.parse().ok()?, most: most.parse().ok()? })
+    }
 }
 
 /// One scene.
@@ -200,7 +213,10 @@ fn shared<S: Serializer>(effects: &Arc<[Effect]>, serializer: S) -> Result<S::Ok
 }
 
 /// A path in JSON, which knows text alone: what is no UTF-8 of a name becomes U+FFFD, as on the terminal.
-pub(super) fn in_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+///
+/// # Errors
+/// Those of `serializer`.
+pub fn in_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
 }
 
@@ -368,6 +384,7 @@ impl SceneReport {
         let Ok(headers) = read_headers(path) else { return };
         let header = &headers.parts[0];
         self.samples = header.number("abbe/samples").map_or(self.samples, |samples| samples as u32);
+        self.adaptive = header.text("abbe/adaptiveSamples").and_then(SampleCounts::read);
         self.seconds.rendering = header.number("abbe/renderSeconds").unwrap_or(0.0);
         self.pixel_hash = header.text("abbe/pixelHash").unwrap_or_default().to_owned();
         self.halving_seconds = header.number("abbe/secondsToHalveError");

@@ -22,6 +22,11 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
     let beside = arguments.beside.as_deref().map(|binary| Beside { binary, file: &arguments.scene.file });
     if let Some(build) = beside {
         build.check()?;
+        if crate::input::is_of_this_process(build.file) {
+            let message =
+                "--beside: expected a file that the other build can read, too, found one of this process alone";
+            return Err(Error::input(build.file, message));
+        }
     }
     let files = ["html", "json", "csv"].map(|ending| arguments.output.join(format!("accuracy.{ending}")));
     for file in &files {

@@ -112,6 +112,8 @@ impl Animation {
                     for Entry { key, node, .. } in entries {
                         match &node.value {
                             Value::Text(file) if key == "file" => found.push(sources.file(node.place, file)),
+                            // They have whatever names they are given.
+                            _ if key == "attributes" => {}
                             _ => within(node, sources, found),
                         }
                     }

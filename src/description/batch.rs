@@ -313,7 +313,8 @@ impl BatchEntry {
     /// Whether the batch gives all of its scenes a `render.stop`.
     #[must_use]
     pub fn batch_has_stop(&self) -> bool {
-        self.layers.iter().any(|(key, node)| *key == "render" && node.get("stop").is_some())
+        let is_written = |node: &Node| node.get("stop").is_some_and(|stop| !matches!(stop.value, Value::Null));
+        self.layers.iter().any(|(key, node)| *key == "render" && is_written(node))
     }
 
     /// Gives values to parameters of the scene, the `-D NAME=VALUE` of the command line; they win over those of a
@@ -378,21 +379,20 @@ impl BatchEntry {
             for setting in &self.settings {
                 setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
             }
-            let mut set = |root: &mut Node, key: &str, value: &str| {
-                let setting = Setting::of_argument(key, value, &mut sources);
-                setting.and_then(|setting| setting.apply(root)).map_err(|fault| fault.into_error(&sources))
-            };
+            let samples = ["render.samples", "render.stop", "render.stop.samples"].map(str::to_owned);
+            let mut last = None;
             for (key, value) in overrides {
-                set(&mut root, key, value)?;
+                let setting = Setting::of_argument(key, value, &mut sources);
+                let set = setting.and_then(|setting| setting.apply(&mut root).map(|()| setting.field()));
+                let field = set.map_err(|fault| fault.into_error(&sources))?;
+                last = samples.iter().position(|name| *name == field).or(last);
             }
             // Samples that are said last bound other targets, too; what is no number of them is told once.
-            let holds = |value: &str| value.trim().parse().is_ok_and(|n: u32| (1..=SAMPLES_LIMIT).contains(&n));
-            let samples = ["render.samples", "render.stop", "render.stop.samples"];
-            match overrides.iter().rev().find(|(key, _)| samples.contains(&key.as_str())) {
-                Some((key, value)) if key == samples[0] && has_stop(&root) && holds(value) => {
-                    set(&mut root, samples[2], value)?
-                }
-                _ => {}
+            let said = root.get("render").and_then(|render| render.get("samples")).filter(|node| holds(node));
+            if let (Some(0), true, Some(said)) = (last, has_stop(&root), said.cloned()) {
+                let setting = Setting::new(&samples[2], said.place, said);
+                let set = setting.and_then(|setting| setting.apply(&mut root));
+                set.map_err(|fault| fault.into_error(&sources))?;
             }
         }
         Animation::new(root, &self.path, sources)
@@ -400,6 +400,16 @@ impl BatchEntry {
 }
 
 /// Whether a scene ends at other targets than its samples, or at samples that stand among them.
+/// Whether a node is a number of samples, however that is spelt.
+fn holds(node: &Node) -> bool {
+    let most = f64::from(SAMPLES_LIMIT);
+    match node.value {
+        Value::Unsigned(n) => (1..=u64::from(SAMPLES_LIMIT)).contains(&n),
+        Value::Float(n) => n.fract() == 0.0 && (1.0..=most).contains(&n),
+        _ => false,
+    }
+}
+
 fn has_stop(root: &Node) -> bool {
     let stop = root.get("render").and_then(|render| render.get("stop"));
     stop.is_some_and(|stop| matches!(&stop.value, Value::Map(targets) if !targets.is_empty()))

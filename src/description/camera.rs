@@ -57,6 +57,8 @@ pub struct ShutterTimes {
 /// Frames for which a shutter may be open that is told by how long: what is more is taken for an angle.
 const LONGEST: f64 = 8.0;
 
+/// Frames from its own at which a shutter opens or closes at the most.
+const FARTHEST: f64 = 1e9;
 /// The most moments at which a scene is looked at.
 const MOST_MOMENTS: u32 = 256;
 
@@ -81,6 +83,14 @@ impl Shutter {
             Shutter::Inline(times) => {
                 let found = format!("{} and {}", in_short(times.open), in_short(times.close));
                 checker.require(times.open < times.close, at, "open before close", found);
+                for (key, time) in [("open", times.open), ("close", times.close)] {
+                    checker.require(
+                        time.is_nan() || time.abs() <= FARTHEST,
+                        at.key(key),
+                        "a number of frames from -1e9 to 1e9",
+                        in_short(time),
+                    );
+                }
                 checker.whole_between(at.key("moments"), times.moments.unwrap_or(2), 2, MOST_MOMENTS);
             }
         }

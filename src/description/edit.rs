@@ -9,7 +9,7 @@ use super::decode::decode;
 use super::fault::Fault;
 use super::keyed;
 use super::node::{Entry, Node, Place, Sources, Value, did_you_mean, quote};
-use super::path::{self, Segment};
+use super::path::{self, At, Segment};
 use super::spectrum::FilePath;
 use super::yaml::{self, MAX_BYTES, MAX_DEPTH};
 use crate::error::{Error, Result};
@@ -156,14 +156,18 @@ fn graft(root: &mut Node, tree: Node, names: &mut Names, sources: &Sources) -> s
 
 /// Lays `over` on `base`: maps field by field, all else as a whole; null changes nothing.
 pub(crate) fn overlay(base: &mut Node, over: &Node) {
+    overlay_at(base, over, At::ROOT);
+}
+
+fn overlay_at(base: &mut Node, over: &Node, at: At<'_>) {
     // What changes over frames is one value.
-    let whole = keyed::is_keyed(base) || keyed::is_keyed(over);
+    let whole = keyed::is_keyed_at(base, at) || keyed::is_keyed_at(over, at);
     match (&mut base.value, &over.value) {
         (_, Value::Null) => {}
         (Value::Map(_), Value::Map(entries)) if !whole => {
             for entry in entries {
                 if let Ok(into) = child(base, &entry.key, entry.key_place) {
-                    overlay(into, &entry.node);
+                    overlay_at(into, &entry.node, at.key(&entry.key));
                 }
             }
         }
@@ -195,6 +199,11 @@ impl Setting {
             return Err(Fault::at_place(place, message).under_path(&path));
         }
         Ok(Setting { path, place, value })
+    }
+
+    /// The field that it names.
+    pub(crate) fn field(&self) -> String {
+        path::display(&self.path)
     }
 
     /// What it names within a field of the scene.
@@ -363,6 +372,17 @@ mod tests {
         let mut all = vec![("scene.yaml", scene.as_str())];
         all.extend(files);
         with_settings(&all, &[])
+    }
+
+    #[test]
+    fn names_of_attributes_may_be_numbers() {
+        let tree = |text: &str| yaml::read(text.as_bytes(), 0).unwrap();
+        let mut base = tree("output: {exr: {attributes: {owner: us, shot: a}}}\nx: {0: 1, 2: 3}\n");
+        overlay(&mut base, &tree("output: {exr: {attributes: {2: x, keys: y}}}\nx: {4: 5}\n"));
+        let found = |node: Option<&Node>| node.unwrap().found();
+        let attributes = base.get("output").and_then(|output| output.get("exr")).and_then(|exr| exr.get("attributes"));
+        assert_eq!(found(attributes), "a map with owner, shot, 2, keys");
+        assert_eq!(found(base.get("x")), "a map with 4");
     }
 
     #[test]

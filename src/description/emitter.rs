@@ -8,6 +8,7 @@ use super::fault::Checker;
 use super::path::At;
 use super::spectrum::{FilePath, Role, Spectrum, SpectrumOrTexture, Vec3, one};
 use super::transform::{TransformStep, check_view, is_similarity, parallel};
+use crate::error::in_short;
 
 /// `environment: {file: sky.exr}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -110,9 +111,15 @@ pub enum EmissionDirection {
     Normal,
 }
 
+/// The greatest weight of a lamp.
+const MOST_WEIGHT: f64 = 1e30;
+
 /// How often lights are chosen is a number of 0 or more.
 pub(crate) fn check_weight(weight: f64, at: At<'_>, checker: &mut Checker<'_>) {
-    checker.not_negative(at.key("sampling_weight"), weight);
+    // Sums of them must be numbers, too.
+    let at = at.key("sampling_weight");
+    checker.not_negative(at, weight);
+    checker.require(!weight.is_finite() || weight <= MOST_WEIGHT, at, "at most 1e30", in_short(weight));
 }
 
 impl EnvironmentLight {

@@ -22,18 +22,25 @@ pub fn yaml(scene: &SceneDescription, directory: &Path) -> String {
         // It would be there twice.
         entries.retain(|entry| entry.key != INCLUDE);
     }
-    Printer { sources, directory }.document(&root)
+    Printer::new(sources, directory).document(&root)
 }
 
 /// Prints trees for a document in a directory.
+#[derive(Clone, Copy)]
 pub(crate) struct Printer<'a> {
     /// Where paths in the tree start from.
-    pub(crate) sources: &'a Sources,
+    sources: &'a Sources,
     /// Directory of the document that is printed.
-    pub(crate) directory: &'a Path,
+    directory: &'a Path,
+    /// Whether a text under `file` is a path.
+    names_files: bool,
 }
 
-impl Printer<'_> {
+impl<'a> Printer<'a> {
+    pub(crate) fn new(sources: &'a Sources, directory: &'a Path) -> Printer<'a> {
+        Printer { sources, directory, names_files: true }
+    }
+
     /// A document: the entries of a map, blocks by indentation.
     pub(crate) fn document(&self, root: &Node) -> String {
         let mut out = String::new();
@@ -52,6 +59,11 @@ impl Printer<'_> {
         }
     }
 
+    /// For what stands under `key`: attributes of a header have whatever names they are given.
+    fn under(self, key: &str) -> Self {
+        Printer { names_files: self.names_files && key != "attributes", ..self }
+    }
+
     /// `key: value` and the end of the line; the cursor stands at column `indent`.
     fn entry(&self, entry: &Entry, indent: usize, out: &mut String) {
         let key = scalar(&entry.key);
@@ -60,7 +72,7 @@ impl Printer<'_> {
         match &entry.node.value {
             Value::Map(inner) if !fits => {
                 let _ = write!(out, "{key}:\n{}", " ".repeat(indent + 2));
-                self.entries(inner, indent + 2, out);
+                self.under(&entry.key).entries(inner, indent + 2, out);
             }
             Value::List(items) if !fits && items.iter().any(|item| !is_scalar(item)) => {
                 let _ = writeln!(out, "{key}:");
@@ -107,11 +119,11 @@ impl Printer<'_> {
 
     fn flow_of(&self, key: &str, node: &Node) -> String {
         match &node.value {
-            Value::Text(file) if key == "file" => {
+            Value::Text(file) if key == "file" && self.names_files => {
                 let path = self.sources.file(node.place, file);
                 scalar(&relative(&path, self.directory).to_string_lossy())
             }
-            _ => self.flow(node),
+            _ => self.under(key).flow(node),
         }
     }
 }
@@ -223,7 +235,7 @@ mod tests {
             let text = std::fs::read_to_string(file.unwrap().path()).unwrap();
             let mut sources = Sources::default();
             let node = read(&text, &mut sources);
-            let printed = Printer { sources: &sources, directory: Path::new("dir") }.document(&node);
+            let printed = Printer::new(&sources, Path::new("dir")).document(&node);
             let again = read(&printed, &mut Sources::default());
             assert!(same(&node, &again), "{printed}");
             count += 1;
@@ -235,10 +247,13 @@ mod tests {
     fn a_file_is_named_from_the_directory_of_the_document() {
         let mut sources = Sources::default();
         let node = read("a: {file: x.png}\n", &mut sources);
-        let printed = |directory: &str| Printer { sources: &sources, directory: Path::new(directory) }.document(&node);
+        let printed = |directory: &str| Printer::new(&sources, Path::new(directory)).document(&node);
         assert_eq!(printed("dir"), "a: {file: x.png}\n");
         assert_eq!(printed(""), "a: {file: dir/x.png}\n");
         assert_eq!(printed("dir/sub"), "a: {file: \"../x.png\"}\n");
+        let text = "output: {exr: {attributes: {file: take7.mov}}}\n";
+        let node = read(text, &mut sources);
+        assert_eq!(Printer::new(&sources, Path::new("far")).document(&node), text);
     }
 
     /// A document in another directory has what its scene includes, which names a file from where it stands.
@@ -268,7 +283,7 @@ mod tests {
     fn a_name_like_a_merge_key_reads_back() {
         let mut sources = Sources::default();
         let node = read("materials: {\"<<\": {diffuse: {reflectance: 0.5}}}\n", &mut sources);
-        let printed = Printer { sources: &sources, directory: Path::new("dir") }.document(&node);
+        let printed = Printer::new(&sources, Path::new("dir")).document(&node);
         assert_eq!(printed, "materials: {\"<<\": {diffuse: {reflectance: 0.5}}}\n");
         assert!(same(&node, &read(&printed, &mut sources)));
     }
@@ -284,7 +299,7 @@ mod tests {
                 entry("x", Value::Float(x)),
                 entry("l", Value::List(vec![Node::new(place, Value::Text(text))])),
             ]));
-            let printed = Printer { sources: &sources, directory: Path::new("") }.document(&node);
+            let printed = Printer::new(&sources, Path::new("")).document(&node);
             prop_assert!(same(&node, &read(&printed, &mut sources)), "{}", printed);
         }
     }

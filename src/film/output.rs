@@ -353,6 +353,9 @@ pub fn directory_of(file: &Path) -> &Path {
 /// # Errors
 /// As [`write_atomically`].
 pub fn prepare_place(file: &Path) -> Result<()> {
+    if file.as_os_str().as_encoded_bytes().last().is_some_and(|byte| std::path::is_separator(char::from(*byte))) {
+        return Err(Error::output(file, "expected the name of a file, found that of a directory"));
+    }
     let Target::File(end) = target(file)? else { return Ok(()) };
     let directory = directory_of(&end);
     let fail = |e: std::io::Error| Error::output(file, words(&end, &e));
@@ -475,6 +478,13 @@ mod tests {
         assert!(e.contains(&format!("the directory {} does not exist", missing.display())), "{e}");
         let e = write_atomically(dir.path(), b"").unwrap_err().to_string();
         assert!(e.ends_with("it is a directory"), "{e}");
+    }
+
+    #[test]
+    fn a_name_of_a_directory_is_none_of_a_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let e = prepare_place(&dir.path().join("new/")).unwrap_err().to_string();
+        assert!(e.ends_with("expected the name of a file, found that of a directory"), "{e}");
     }
 
     #[cfg(unix)]

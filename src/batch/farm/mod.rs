@@ -22,9 +22,6 @@ use std::path::{Path, PathBuf};
 /// A task has a share of the pictures: a sheet of those alone would stand in the place of another task's.
 const NO_SHEET: [&str; 2] = ["--set", "output.contact_sheet=false"];
 
-/// Below these each process has files of its own.
-const OWN: [&str; 3] = ["/dev/stdin", "/dev/fd", "/proc"];
-
 /// How pictures and frames are shared out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
@@ -99,7 +96,7 @@ impl Job {
     /// # Errors
     /// [`Error::Config`] and [`Error::Input`] with the faults of all scenes, or for a cut that one of them does not have.
     pub fn of(source: &Path, overrides: &Overrides, cut: Cut) -> Result<Job> {
-        if OWN.iter().any(|own| source.starts_with(own)) {
+        if crate::input::is_of_this_process(source) {
             return Err(Error::input(source, "expected a file that tasks can read, found one of this process alone"));
         }
         let mut groups: Vec<Group> = Vec::new();

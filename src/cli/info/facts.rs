@@ -43,8 +43,10 @@ pub struct PartOfPicture {
     pub samples: [u32; 2],
     /// Whether it has all that it is to have; a checkpoint has not.
     pub whole: bool,
-    /// How much of its samples it has, 0 to 1.
-    pub done: f64,
+    /// How much of its samples it has, 0 to 1; nobody knows where an error or a time ends the render.
+    pub done: Option<f64>,
+    /// How many samples a pixel has in the mean.
+    pub reached: f64,
     /// Of rendering.
     pub seconds: f64,
 }
@@ -171,11 +173,12 @@ fn part(path: &Path, json: &str) -> Result<PartOfPicture> {
         return Err(unsound("its header does not hold together"));
     }
     let share = header.share();
-    let all = share.rows(header.finish.window).pixels() as f64 * share.samples.len() as f64;
-    let done: f64 = header.claims.camera.iter().map(|(w, samples)| w.pixels() as f64 * samples.len() as f64).sum();
+    let pixels = share.rows(header.finish.window).pixels() as f64;
+    let rendered: f64 = header.claims.camera.iter().map(|(w, samples)| w.pixels() as f64 * samples.len() as f64).sum();
     Ok(PartOfPicture {
         whole: header.is_whole(),
-        done: if all > 0.0 { done / all } else { 0.0 },
+        done: header.finish.target.is_none().then(|| rendered / (pixels * share.samples.len() as f64)),
+        reached: rendered / pixels,
         tile: header.tile,
         samples: [header.samples[0], header.samples[1].saturating_sub(1)],
         seconds: header.seconds,

@@ -25,6 +25,7 @@ enum Found {
 /// One file of the answer in JSON.
 #[derive(Debug, Serialize)]
 struct Answer<'a> {
+    #[serde(serialize_with = "crate::batch::report::in_text")]
     file: &'a Path,
     bytes: u64,
     #[serde(flatten)]

@@ -56,7 +56,11 @@ pub fn exr(file: &Path, bytes: u64, exr: &ExrFacts) -> String {
         let [tile, tiles] = part.tile;
         let [from, to] = part.samples;
         let tile = if tiles > 1 { format!("tile {tile} of {tiles}, ") } else { String::new() };
-        let done = if part.whole { String::new() } else { format!(", {} of it done", per_cent(part.done)) };
+        let done = match part.done {
+            _ if part.whole => String::new(),
+            Some(done) => format!(", {} of it done", per_cent(done)),
+            None => format!(" at the most, {:.1} of them done", part.reached),
+        };
         line(&mut out, "part", &format!("{what}: {tile}samples {from} to {to}{done}, in {}", seconds(part.seconds)));
         line(&mut out, "scene", &format!("{} ({})", one_line(&part.scene), one_line(&part.source)));
     }

@@ -354,7 +354,7 @@ impl<'a> Export<'a> {
     }
 
     fn yaml(&self, node: &Node) -> String {
-        Printer { sources: self.sources, directory: self.directory }.flow(node)
+        Printer::new(self.sources, self.directory).flow(node)
     }
 
     /// A path as it is written in the file.
