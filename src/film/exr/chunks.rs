@@ -126,9 +126,10 @@ fn starts(reader: &mut impl Read, meta: &MetaData, length: u64) -> Result<Vec<u6
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ChannelData, Compression, ExrImage, Layout, encode_exr, read_exr};
+    use super::super::{ChannelData, ColourEncoding, Compression, ExrImage, Layout, encode_exr, read_exr};
     use super::{MetaData, starts};
     use crate::film::Window;
+    use crate::spectrum::ColourSpace;
     use std::collections::BTreeSet;
 
     /// Of rows packed by DWA one bit more in any of what they announce: the file is refused, and no memory is taken for it. Rows that are
@@ -144,7 +145,7 @@ mod tests {
                 channels: ["R", "G"]
                     .map(|name| (name.to_owned(), ChannelData::F32((0..side * side).map(value).collect())))
                     .into(),
-                colour: None,
+                colour: Some(ColourEncoding::of(ColourSpace::Rec709)),
                 attributes: Vec::new(),
                 data: BTreeSet::new(),
                 compression,
@@ -169,9 +170,7 @@ mod tests {
                     assert!(e.to_string().ends_with("announces more than its pixels can take"), "{count} {byte}: {e}");
                 }
             }
-            // Of whose bytes each is large.
-            let noise = |i: u32| f32::from_bits(0x4555_5555 ^ i.wrapping_mul(0x9e37_79b1) >> 4);
-            std::fs::write(&path, encoded(2, compression, &noise)).unwrap();
+            std::fs::write(&path, encoded(2, compression, &|i| 0.25 + 0.3 * i as f32)).unwrap();
             read_exr(&path).unwrap();
         }
     }
