@@ -205,6 +205,13 @@ impl LayerPlan {
         one_over_two_to(if matches!(integrator, Integrator::Depth) { self.length_exponent } else { self.exponent })
     }
 
+    /// The sensitivity as a number from 1 to 2, by which samples of light are multiplied, and two to the power by which their
+    /// sums are: what makes up for very dim or bright light would be more or less than sums hold.
+    fn gain(&self) -> (f32, i32) {
+        let exponent = self.sensitivity.to_bits() >> 52;
+        ((self.sensitivity / f64::from_bits(exponent << 52)) as f32, exponent as i32 - 1023)
+    }
+
     /// Light in the terms of the picture.
     fn as_the_picture(&self, xyz: [f32; 3]) -> [f32; 3] {
         if self.in_xyz { xyz } else { rgb(&self.rgb_from_xyz, xyz) }
@@ -226,7 +233,7 @@ impl LayerPlan {
                 Source::Band(i) => numbers.push(in_band(scene, i, wavelengths, light * unit)),
                 Source::Ways(ways, of) => {
                     let counts = ways.holds(Way::Caustic) && of.is_none_or(|of| of == group);
-                    let light = xyz.map(|x| x * self.sensitivity as f32);
+                    let light = xyz.map(|x| x * self.gain().0);
                     numbers.extend(if counts { self.as_the_picture(light) } else { [0.0; 3] });
                 }
                 Source::Surface(_) | Source::Seen(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => {}
@@ -244,7 +251,10 @@ impl LayerPlan {
             {
                 let unless_squared = |holds| if squared { Holds::Data } else { holds };
                 let exponent = self.exponent_of(&layer.source);
-                let exponent = if squared { 2 * (exponent + lowered(exponent)) } else { exponent };
+                let lowered = lowered(exponent);
+                let gain = if matches!(layer.source, Source::Light(..) | Source::Ways(..)) { self.gain().1 } else { 0 };
+                let exponent = exponent + gain;
+                let exponent = if squared { 2 * (exponent + lowered) } else { exponent };
                 match layer.source {
                     Source::Surface(quantity) | Source::Seen(quantity) => {
                         let colour = quantity == Quantity::Albedo;

@@ -63,6 +63,9 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
             .into_iter()
             .fold(STAGE.to_owned(), |stage, lamp| stage.replace(lamp, &format!("{lamp}e{power}")))
     };
+    let film = |sensitivity: &str| {
+        frame("on", "off").replace("height: 16", &format!("height: 16, sensitivity: {sensitivity}"))
+    };
     let adaptive = FRAME.replace("samples: 16", "samples: 64, techniques: {adaptive: on, merging: off}");
     let adaptive = adaptive.replace("width: 24, height: 16", "width: 64, height: 48");
     let scenes = [
@@ -84,6 +87,10 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
         // As dark and as bright as sums that count by the number alone do not hold.
         ("darkness", frame("on", "off") + &lamps(-26)),
         ("glare", frame("on", "off") + &lamps(25)),
+        // And what a sensitivity makes up for, or takes away.
+        ("darkness made up for", film("3e26") + &lamps(-26)),
+        ("glare made up for", film("3e-25") + &lamps(25)),
+        ("a film of little sensitivity", film("1e-20") + STAGE),
     ];
     let families: [&[&str]; 3] = [
         &["emission", "caustic", "direct", "indirect"],

@@ -114,7 +114,7 @@ impl Values {
         }
         let Values { numbers, surface, others } = self;
         let mut surface = surface.iter();
-        let sensitivity = layers.sensitivity as f32;
+        let (gain, _) = layers.gain();
         for layer in &layers.layers {
             let unit = layers.unit_of(&layer.source);
             let squares = layer.squares.is_some().then(|| one_over_two_to(lowered(layers.exponent_of(&layer.source))));
@@ -130,7 +130,7 @@ impl Values {
                 }
                 Source::Light(of, form) => {
                     let seen = of.map_or(own, |i| others[i]);
-                    let xyz = seen.xyz.map(|x| x * sensitivity);
+                    let xyz = seen.xyz.map(|x| x * gain);
                     match form {
                         Form::Xyz => put(numbers, xyz, squares.map(|factor| [factor; 3])),
                         Form::Rgba => {
@@ -144,7 +144,7 @@ impl Values {
                 }
                 Source::Ways(ways, group) => {
                     let light = ledger.map_or(Lanes::ZERO, |ledger| ledger.light(ways, group));
-                    let xyz = observer::xyz(light * unit, wavelengths).map(|x| x * sensitivity);
+                    let xyz = observer::xyz(light * unit, wavelengths).map(|x| x * gain);
                     numbers.extend(layers.as_the_picture(xyz));
                 }
                 // These stand in the pixel once.
