@@ -183,6 +183,10 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     };
     file.attributes = attributes(finish, frame, report, report.error.as_ref());
     file.attributes.extend(shared_errors(shared));
+    if finish.bands {
+        let bands = finish.spectral_channels().start;
+        file.attributes.push((exr::BANDS.to_owned(), Attribute::Int(bands as i32)));
+    }
     if exr.aces_container && as_asked {
         file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
     } else if exr.aces_container {

@@ -6,6 +6,7 @@ mod common;
 mod seen;
 
 use abbe::batch::{self, Overrides};
+use abbe::film::compare::{CompareOptions, Verdict, compare};
 use abbe::film::cryptomatte::id_of;
 use abbe::film::exr::{ExrPart, read_exr};
 use std::collections::BTreeMap;
@@ -437,6 +438,46 @@ fn a_band_may_be_called_as_one_of_the_spectral_file() {
         pictures.push(picture.channels);
     }
     assert_eq!(pictures[0], pictures[1]);
+}
+
+/// Grey that is 0.2 in one picture and 0.9 in the other beyond 700 nm: bands that are called like colours are compared all the
+/// same, also beside a layer in colours.
+#[test]
+fn bands_are_compared_whatever_they_are_called() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let picture = |name: &str, infrared: f64, bands: [&str; 4], rest: &str| {
+        let [red, green, blue, beyond] = bands;
+        let bands = format!(
+            "height: 16, bands: [{{name: {red}, response: {{table: [[600, 1], [690, 1]]}}}}, \
+             {{name: {green}, response: {{table: [[500, 1], [600, 1]]}}}}, \
+             {{name: {blue}, response: {{table: [[400, 1], [500, 1]]}}}}, \
+             {{name: {beyond}, response: {{table: [[700, 1], [780, 1]]}}}}]"
+        );
+        let text = format!(
+            "{}lights: [{{constant: {{radiance: {{table: [[400, 0.5], [690, 0.5], [700, {infrared}], [780, {infrared}]]}}}}}}]\n\
+             {rest}",
+            FRAME.replace("height: 16", &bands)
+        );
+        common::write(&path("s.yaml"), text.as_bytes());
+        let overrides = Overrides { output: Some(path(name)), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        read_exr(&path(name)).unwrap()
+    };
+    let named = [["R", "G", "B", "IR"], ["C", "D", "E", "A"], ["U", "V", "W", "Y"], ["X", "Y", "Z", "NIR"]];
+    for (bands, rest) in named.into_iter().map(|bands| (bands, "")).chain([(named[0], "layers: [emission]\n")]) {
+        let [a, b] = [("a.exr", 0.2), ("b.exr", 0.9)].map(|(name, infrared)| picture(name, infrared, bands, rest));
+        let told = compare(&a, &b, &CompareOptions::default());
+        assert_eq!(told.verdict, Verdict::Different, "{bands:?} {rest}: {}", told.table());
+        for band in bands {
+            let figures = told.channels.iter().find(|channel| channel.name == band).unwrap();
+            // The sky is the same in the bands of the colours, seen by other wavelengths.
+            let beyond = band == bands[3];
+            assert_eq!(figures.mean_ratio < 0.5, beyond, "{bands:?} {rest}: {}", told.table());
+        }
+        assert_eq!(compare(&a, &a, &CompareOptions::default()).verdict, Verdict::Same);
+    }
 }
 
 /// `whitted` draws nothing, so that another seed is the same picture, and the standard errors of its bands are 0, as those of

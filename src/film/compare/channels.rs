@@ -4,7 +4,7 @@ use super::noise::{Known, Pair};
 use super::{CompareOptions, Origin};
 use crate::film::Window;
 use crate::film::accumulate::REPLICATES;
-use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, part, stderr_name};
+use crate::film::exr::{BANDS, ExrFile, ExrPart, SHARED_ERRORS, part, stderr_name};
 use crate::spectrum::colour;
 use std::collections::BTreeSet;
 
@@ -22,7 +22,7 @@ pub(super) fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions
     same_window("display windows", a.display, b.display, options.origin)?;
     let names = compared_names(a, b)?;
     // X, Y, Z and bands are the same in any primaries.
-    if names.iter().any(|name| ["R", "G", "B"].contains(&name.as_str())) {
+    if are_colours([a, b]) && names.iter().any(|name| ["R", "G", "B"].contains(&name.as_str())) {
         same_colours(a, b)?;
     }
     let variance = match options.sample_variance {
@@ -113,10 +113,20 @@ fn compared_names(a: &ExrFile, b: &ExrFile) -> Result<Vec<String>, String> {
     Ok(of_a)
 }
 
+/// Whether a channel of the `files` that is called as a colour, or alpha, is one: not in data, and not where bands stand in
+/// place of colours, which may have any names.
+pub(super) fn are_colours(files: [&ExrFile; 2]) -> bool {
+    let is_data = |file: &ExrFile| file.parts[0].text("colorInteropID") == Some("data");
+    !files.into_iter().any(|file| is_data(file) || file.parts[0].text(BANDS).is_some())
+}
+
 /// The channels of a picture that are compared with another's.
 fn own_names(file: &ExrFile) -> Vec<String> {
     let all: Vec<&str> = parts(file).flat_map(|part| &part.channels).map(|(name, _)| name.as_str()).collect();
     let owned = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<String>>();
+    if !are_colours([file; 2]) {
+        return all.into_iter().filter(|name| !is_of_samples(name)).map(str::to_owned).collect();
+    }
     let is_band = |name: &&str| (name.starts_with("S0.") || name.starts_with("T.")) && name.ends_with("nm");
     let bands: Vec<&str> = all.iter().copied().filter(is_band).collect();
     if !bands.is_empty() {
@@ -267,6 +277,31 @@ mod tests {
         let c = compare(&bands(16.0), &bands(64.0), &CompareOptions::default());
         assert_eq!(c.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["a", "b.T"]);
         assert_eq!(c.verdict, Verdict::Same, "{}", c.table());
+    }
+
+    /// As the bands of a picture may be called, and alpha among them; without a word of it they are colours.
+    #[test]
+    fn what_is_no_colour_is_compared_whatever_it_is_called() {
+        let bands = |said: Option<(&str, &str)>, last: f32| {
+            let band = |name: &str, value| (name.to_string(), vec![value; PIXELS]);
+            let all = [band("A", 1.0), band("G", 1.0), band("IR", last), band("R", 1.0), band("B", 1.0)];
+            let mut file = file([band("stderr.IR", 0.0)].into_iter().chain(all).collect());
+            file.parts[0].texts.extend(said.map(|(name, value)| (name.to_owned(), value.to_owned())));
+            file
+        };
+        for (said, count, verdict) in [
+            (None, 3, Verdict::Same),
+            (Some(("colorInteropID", "lin_rec709_scene")), 3, Verdict::Same),
+            (Some(("colorInteropID", "data")), 5, Verdict::Different),
+            (Some((BANDS, "5")), 5, Verdict::Different),
+        ] {
+            let c = compare(&bands(said, 1.0), &bands(said, 2.0), &CompareOptions::default());
+            assert_eq!((c.verdict, c.channels.len()), (verdict, count), "{said:?}: {}", c.table());
+        }
+        // What the first part says is of the picture: further ones may be data.
+        let mut layers = bands(None, 1.0);
+        layers.parts.push(bands(Some(("colorInteropID", "data")), 1.0).parts.remove(0));
+        assert_eq!(own_names(&layers), ["R", "G", "B"]);
     }
 
     #[test]

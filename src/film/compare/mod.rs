@@ -26,7 +26,7 @@ mod table;
 
 use crate::film::exr::{ExrFile, Samples};
 use crate::math::statistics::normal_two_sided_p;
-use channels::{not_compared, pairs};
+use channels::{are_colours, not_compared, pairs};
 use noise::Pair;
 use std::collections::BTreeSet;
 
@@ -185,8 +185,9 @@ pub struct Comparison {
 /// Compares two files; `b` is the reference.
 ///
 /// Compared are the spectral bands (`S0.…nm`, `T.…nm`) of a file that has any, else R, G, B, else X, Y, Z, else Y, else all
-/// channels without alpha and what tells of samples, such as `stderr.*`; in whichever parts they are that have the window of the
-/// first. These must be the same in both files.
+/// channels without alpha and what tells of samples, such as `stderr.*`; of data, and where bands stand in place of colours, all
+/// channels without the latter, whatever they are called; in whichever parts they are that have the window of the first. These
+/// must be the same in both files.
 #[must_use]
 pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison {
     let pairs = match pairs(a, b, options) {
@@ -197,7 +198,8 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
     let finite: Vec<bool> = (0..count).map(|i| pairs.iter().all(|pair| pair.is_finite(i))).collect();
     let pixels = finite.iter().filter(|&&f| f).count();
     // Colours have one unit. Bands of other widths and a depth beside them have nothing to do with each other's.
-    let are_colours = pairs.iter().all(|pair| ["R", "G", "B", "X", "Y", "Z"].contains(&pair.name.as_str()));
+    let is_colour = |pair: &Pair| ["R", "G", "B", "X", "Y", "Z"].contains(&pair.name.as_str());
+    let are_colours = are_colours([a, b]) && pairs.iter().all(is_colour);
     let mean_of = |pair: &Pair| kept(pair.b, &finite).sum::<f64>() / pixels.max(1) as f64;
     let mean_of_all = pairs.iter().map(mean_of).sum::<f64>() / pairs.len() as f64;
     let figures = |pair: &Pair| pair.figures(&finite, if are_colours { mean_of_all } else { mean_of(pair) });

@@ -1,8 +1,11 @@
 use super::*;
 use crate::film::Window;
-use crate::film::exr::{Attribute, ChannelData, Compression, ExrImage, ExrPart, Layout, read_exr, write_exr};
+use crate::film::exr::{
+    Attribute, ChannelData, ColourEncoding, Compression, ExrImage, ExrPart, Layout, read_exr, write_exr,
+};
 use crate::math::sampler::mix64;
 use crate::math::statistics::Moments;
+use crate::spectrum::ColourSpace;
 use std::collections::BTreeSet;
 
 const SIDE: u32 = 64;
@@ -354,7 +357,7 @@ fn read_back(channels: Vec<(String, ChannelData)>, attributes: Vec<(String, Attr
         frame: [SIDE; 2],
         window: Window::full(SIDE, SIDE),
         channels,
-        colour: None,
+        colour: Some(ColourEncoding::of(ColourSpace::Rec709)),
         attributes,
         data: BTreeSet::new(),
         compression: Compression::None,

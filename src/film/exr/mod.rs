@@ -343,6 +343,9 @@ pub enum StandardError {
 /// where light of one path falls into several or samples of all pixels share their wavelengths; a number.
 pub const SHARED_ERRORS: &str = "abbe/sharedErrors";
 
+/// The attribute that says that bands stand in place of colours, whatever they are called, and how many; a number.
+pub const BANDS: &str = "abbe/bands";
+
 /// The name of the channel with the standard errors of the channel `name`.
 #[must_use]
 pub fn stderr_name(name: &str) -> String {
