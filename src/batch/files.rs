@@ -15,6 +15,7 @@ use crate::film::output;
 use crate::film::png;
 use crate::film::resolve::Image;
 use crate::transport::layers::{Channel, Holds};
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -128,7 +129,7 @@ fn note_loss(path: &Path, finish: &Finish, file: &ExrImage, report: &mut SceneRe
 }
 
 /// The file of a picture, and notes on it.
-fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> ExrImage {
+fn exr_image<'a>(finish: &'a Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> ExrImage {
     let exr = &finish.output.exr;
     let precision = match exr.precision {
         description::Precision::Half => exr::Precision::Half,
@@ -149,10 +150,23 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         true => shared_errors_of_bands(finish, frame, 0..finish.spectral_channels().start, &errors),
         false => frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing),
     };
-    let layer = |(i, channel): (usize, &Channel)| {
+    let mut beyond: BTreeMap<&str, Beyond> = BTreeMap::new();
+    let layer = |(i, channel): (usize, &'a Channel)| {
         let own = LayerPlane {
             name: channel.name.clone(),
-            plane: if channel.holds == Holds::Once { frame.layer_once(i) } else { whole(frame.layer(i), channel) },
+            plane: match channel.holds {
+                Holds::Once => frame.layer_once(i),
+                Holds::Band | Holds::Light | Holds::Data => {
+                    let plane = frame.layer(i);
+                    // What sums count as it is has its place in a float; so has coverage, which is no light.
+                    if channel.exponent != 0 {
+                        let layer = channel.name.rsplit_once('.').map_or(&*channel.name, |(layer, _)| layer);
+                        let (beyond, unit) = (beyond.entry(layer).or_default(), unit(channel));
+                        plane.iter().for_each(|x| beyond.add(f64::from(*x) * unit));
+                    }
+                    whole(plane, channel)
+                }
+            },
             kind: match channel.holds {
                 Holds::Light => exr::PlaneKind::Colour,
                 Holds::Band => exr::PlaneKind::Band,
@@ -174,6 +188,8 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         let samples = frame.film.layers.invalid.total();
         report.notes.push(format!("in {samples} samples a number of a layer could not be added, and counts as zero"));
     }
+    let told = beyond.iter().filter_map(|(layer, beyond)| Some(format!("layer {layer}: {}", beyond.note()?)));
+    report.notes.extend(told);
     let as_asked = beauty.note.is_none();
     report.notes.extend(beauty.note.take());
     let mut file = beauty.exr;
@@ -193,9 +209,9 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         report.notes.push("an ACES container holds half floats only: the file is none".to_owned());
     }
     if finish.variance {
-        let mut lost = Squares::default();
+        let mut lost = Beyond::default();
         let mut squares = |errors: &[f32]| {
-            errors.iter().for_each(|error| lost.add(*error));
+            errors.iter().for_each(|error| lost.add(f64::from(*error) * f64::from(*error)));
             ChannelData::F32(errors.iter().map(|x| x * x).collect())
         };
         // Bands stand in place of colours.
@@ -207,7 +223,9 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         for &(name, i) in finish.base().colours() {
             file.push_data(format!("variance.{name}"), squares(&image.standard_error[i]));
         }
-        report.notes.extend(lost.note());
+        report
+            .notes
+            .extend(lost.note().map(|lost| format!("layer variance: {lost}; a layer stderr holds their roots")));
     }
     if finish.sample_count {
         let count = |cells: &PixelCells| cells.iter().map(|cell| cell.count).sum();
@@ -226,33 +244,34 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     file
 }
 
-/// What becomes of standard errors as their squares are written.
+/// What 32-bit floats do not hold of numbers as they are written.
 #[derive(Default)]
-struct Squares {
-    /// How many are infinite whose root is not.
+struct Beyond {
+    /// How many are infinite then that are not.
     infinite: usize,
-    /// The greatest root.
-    most: f32,
+    /// The size of the greatest.
+    most: f64,
 }
 
-impl Squares {
-    fn add(&mut self, error: f32) {
-        if error.is_finite() {
-            self.infinite += usize::from((error * error).is_infinite());
-            self.most = self.most.max(error);
+impl Beyond {
+    fn add(&mut self, number: f64) {
+        if number.is_finite() {
+            self.infinite += usize::from((number as f32).is_infinite());
+            self.most = self.most.max(number.abs());
         }
     }
 
-    /// What 32-bit floats do not hold of them, if anything: the greatest, or all.
+    /// What is lost, if anything: the greatest, or all.
     fn note(&self) -> Option<String> {
-        let lost = match self.infinite {
-            0 if self.most > 0.0 && self.most * self.most < f32::MIN_POSITIVE => {
-                "all values are less than 32-bit floats hold with all digits (1.2e-38)".to_owned()
+        match self.infinite {
+            0 if self.most > 0.0 && self.most < f64::from(f32::MIN_POSITIVE) => {
+                Some("all values are less than 32-bit floats hold with all digits (1.2e-38)".to_owned())
             }
-            0 => return None,
-            infinite => format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"),
-        };
-        Some(format!("layer variance: {lost}; a layer stderr holds their roots"))
+            0 => None,
+            infinite => {
+                Some(format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"))
+            }
+        }
     }
 }
 
@@ -261,9 +280,14 @@ fn shared_errors(shared: f64) -> Option<(String, Attribute)> {
     (shared > 1.0).then(|| (exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))))
 }
 
+/// What the sums of `channel` count its numbers over.
+fn unit(channel: &Channel) -> f64 {
+    2f64.powi(channel.exponent)
+}
+
 /// The numbers of `channel`, or their standard errors, of which `plane` is as the sums count them.
 fn whole(mut plane: Vec<f32>, channel: &Channel) -> Vec<f32> {
-    let unit = 2f64.powi(channel.exponent);
+    let unit = unit(channel);
     plane.iter_mut().for_each(|x| *x = (f64::from(*x) * unit) as f32);
     plane
 }
@@ -402,12 +426,11 @@ mod tests {
     #[test]
     fn variances_that_floats_do_not_hold_are_told() {
         let note = |errors: &[f32]| {
-            let mut squares = Squares::default();
-            errors.iter().for_each(|error| squares.add(*error));
+            let mut squares = Beyond::default();
+            errors.iter().for_each(|error| squares.add(f64::from(*error) * f64::from(*error)));
             squares.note()
         };
-        let beyond = "layer variance: 2 values are more than 32-bit floats hold: they are written as infinite; \
-                      a layer stderr holds their roots";
+        let beyond = "2 values are more than 32-bit floats hold: they are written as infinite";
         assert_eq!(note(&[1.9e19, 1.0, 1e25, f32::INFINITY, f32::NAN]).as_deref(), Some(beyond));
         assert!(note(&[1e-20, 0.0, f32::NAN]).unwrap().contains("less than 32-bit floats hold"));
         // What is next to nothing beside the rest is no loss.

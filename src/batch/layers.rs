@@ -23,8 +23,8 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
         rgb_from_xyz: colour_space(description.output.colour).matrix_from_xyz(),
         in_xyz: finish::base(&description.output, !description.image.bands.is_empty()).is_xyz(),
         sensitivity: description.image.sensitivity,
-        exponent: scene.light_exponent,
-        length_exponent: scene.length_exponent,
+        light: scene.light_powers,
+        lengths: scene.length_powers,
         distances: matches!(description.integrator, description::Integrator::Depth(_)),
         sample_distance: 1.0 / f64::from(samples).sqrt(),
         ..LayerPlan::default()

@@ -227,7 +227,7 @@ pub struct Part<'a> {
 
 fn empty_film(job: &FrameJob, window: Window, layers: Layout) -> Result<Film> {
     let film = Film::new(job.scene.camera.resolution, window)?;
-    Ok(film.with_layers(layers).with_exponent(job.scene.light_exponent))
+    Ok(film.with_layers(layers).with_exponent(job.scene.light_powers.exponent))
 }
 
 /// Empty sums of paths from the lights, where there are any; they land anywhere.

@@ -13,6 +13,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, SAMPLES_LIMIT};
 use crate::film::filter::{Filter, FilterSampler};
 use crate::scene::Scene;
+use crate::scene::brightness::Powers;
 use crate::scene::casters::Casters;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
@@ -201,12 +202,12 @@ pub(super) fn prepare_scene(
     let mut moments = blur.scenes;
     moments.iter_mut().for_each(&alter);
     // One film counts the light of all.
-    let exponents = moments.iter().map(|moment| moment.light_exponent);
-    scene.light_exponent = exponents.fold(scene.light_exponent, i32::max);
-    moments.iter_mut().for_each(|moment| moment.light_exponent = scene.light_exponent);
-    let exponents = moments.iter().map(|moment| moment.length_exponent);
-    scene.length_exponent = exponents.fold(scene.length_exponent, i32::max);
-    moments.iter_mut().for_each(|moment| moment.length_exponent = scene.length_exponent);
+    let powers = moments.iter().map(|moment| moment.light_powers);
+    scene.light_powers = powers.fold(scene.light_powers, Powers::max);
+    moments.iter_mut().for_each(|moment| moment.light_powers = scene.light_powers);
+    let powers = moments.iter().map(|moment| moment.length_powers);
+    scene.length_powers = powers.fold(scene.length_powers, Powers::max);
+    moments.iter_mut().for_each(|moment| moment.length_powers = scene.length_powers);
     let census = motion::census(&scene, &moments);
     let layers = layers::plan(&description, &scene, planned)?;
     if layers.parts_light() {
@@ -218,8 +219,8 @@ pub(super) fn prepare_scene(
     plan.effects.extend(blur.said);
     if matches!(plan.integrator, Integrator::Depth) {
         // Distances are no brighter where the lamps are.
-        scene.light_exponent = scene.length_exponent;
-        moments.iter_mut().for_each(|moment| moment.light_exponent = scene.length_exponent);
+        scene.light_powers = scene.length_powers;
+        moments.iter_mut().for_each(|moment| moment.light_powers = scene.length_powers);
     }
     let filter = sampler(&description)?;
     let choosing = Instant::now();

@@ -25,18 +25,29 @@ const ASKED: usize = 64;
 /// a sun.
 const MOST: i32 = 20;
 
+/// Which powers of two sums count numbers over. Those of the brighter scene are greater.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Powers {
+    /// The numbers are divided by two to this power.
+    pub exponent: i32,
+    /// And before they are squared by two to this one besides: sums, which hold less than 2³⁸, have the squares of numbers up
+    /// to 2¹⁹ times the greatest that is judged then.
+    pub squared: i32,
+}
+
 impl Scene {
     /// What light is multiplied by before it is added up; a power of two.
     #[must_use]
     pub fn light_unit(&self) -> f32 {
-        f32::from_bits(((127 - self.light_exponent) as u32) << 23)
+        f32::from_bits(((127 - self.light_powers.exponent) as u32) << 23)
     }
 
-    /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
-    /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show, and in `whitted` highlights and the
-    /// `ambient` light, lies between 2⁻²⁴ and 2²⁰. A darker scene is raised to one, with 2³⁸ left above; a brighter one lowered
-    /// to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or more keeps its mantissa. `boxes` are those of the objects.
-    pub(super) fn film_exponent(&self, powers: &[f64], ambient: Option<f64>, boxes: &[Aabb]) -> i32 {
+    /// The powers of two over which sums count the light of the scene, as a film does
+    /// ([`crate::film::accumulate::Film::exponent`]): 0 where the brightest of what its lights, of [`Light::power`] `powers`,
+    /// and its fog show, and in `whitted` highlights and the `ambient` light, lies between 2⁻²⁴ and 2²⁰. A darker scene is
+    /// raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or more keeps
+    /// its mantissa. `boxes` are those of the objects.
+    pub(super) fn powers_of_light(&self, powers: &[f64], ambient: Option<f64>, boxes: &[Aabb]) -> Powers {
         let lamps = || self.lights.iter().zip(powers.iter().copied());
         let shown = lamps().filter_map(|(light, power)| match light {
             Light::Area { object, .. } | Light::AlongNormal { object, .. } => {
@@ -64,9 +75,9 @@ impl Scene {
         counted_over(brightness.filter(|b| b.is_finite()).fold(0.0, f64::max))
     }
 
-    /// The power of two by which sums divide lengths, in the same way: by how far from the origin and from the camera anything
+    /// The powers of two over which sums count lengths, in the same way: by how far from the origin and from the camera anything
     /// with an end is, and from the camera a plane.
-    pub(super) fn sums_of_lengths_exponent(&self) -> i32 {
+    pub(super) fn powers_of_lengths(&self) -> Powers {
         let eye = self.camera.eye();
         let planes = self.objects[..self.standing].iter().filter_map(|object| match &object.geometry {
             Geometry::Shape(Shape::Plane(plane)) => Some(plane.height(eye).abs()),
@@ -112,18 +123,19 @@ impl Scene {
     }
 }
 
-/// The power of two over which numbers are counted whose greatest is about `most`.
-fn counted_over(most: f64) -> i32 {
+/// The powers of two over which numbers are counted whose greatest is about `most`.
+fn counted_over(most: f64) -> Powers {
     if most < f64::MIN_POSITIVE {
-        return 0;
+        return Powers::default();
     }
     // The exponent of the number.
     let log2 = (most.to_bits() >> 52) as i32 - 1023;
-    match log2 {
+    let exponent = match log2 {
         ..-24 => log2.max(-100),
         MOST.. => (log2 - MOST).min(100),
         _ => 0,
-    }
+    };
+    Powers { exponent, squared: (log2 - exponent).clamp(0, MOST) }
 }
 
 /// Where a lamp without extent sends its light.
@@ -151,11 +163,16 @@ impl Cone {
 
 #[cfg(test)]
 mod tests {
+    use super::Powers;
+    use crate::film::accumulate::SAMPLE_LIMIT;
     use crate::scene::compile::testing::compiled;
 
+    fn powers(text: &str) -> Powers {
+        compiled(&format!("camera: {{origin: [0, 5, 9], target: [0, 0, 0], fov_deg: 40}}\n{text}")).light_powers
+    }
+
     fn exponent(text: &str) -> i32 {
-        let text = format!("camera: {{origin: [0, 5, 9], target: [0, 0, 0], fov_deg: 40}}\n{text}");
-        compiled(&text).light_exponent
+        powers(text).exponent
     }
 
     /// A lamp where a ball touches the top of a pole, in whichever order: it lights nothing there that is seen, and the sky of 0.1
@@ -201,6 +218,21 @@ mod tests {
             let inside = "material: {boundary: {}}, inside: air, outside: vacuum";
             let ball = format!("{air}{lamp}shapes: [sphere: {{radius: {far:e}, {inside}}}]\n");
             assert_eq!(exponent(&ball), 0, "{far:e}");
+        }
+    }
+
+    /// Of a sky of 1.5 · 2ⁿ sums have the squares of what is 2¹⁸ times as bright, or of all that they hold; from 1 on its own
+    /// square is counted as 1.5².
+    #[test]
+    fn squares_have_room_above_the_brightest() {
+        let limit = f64::from(SAMPLE_LIMIT);
+        for n in (-60..=100).step_by(5).chain([17, 18, 19, 21]) {
+            let sky = 1.5 * 2f64.powi(n);
+            let Powers { exponent, squared } =
+                powers(&format!("shapes: [sphere: {{radius: 1}}]\nlights: [constant: {{radiance: {sky:e}}}]\n"));
+            let most = (sky * 2f64.powi(18 - exponent)).min(limit.next_down());
+            assert!((most / 2f64.powi(squared)).powi(2) < limit, "2^{n}: {exponent}, {squared}");
+            assert!(n < 0 || exponent + squared == n, "2^{n}: {exponent}, {squared}");
         }
     }
 

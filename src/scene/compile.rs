@@ -22,6 +22,7 @@ mod surface;
 mod wavelengths;
 
 use super::apart::put_apart;
+use super::brightness::Powers;
 use super::bvh::{Aabb, Bvh};
 use super::camera::Camera;
 use super::choice::{self, Asked, Choice};
@@ -328,8 +329,8 @@ impl<'a> Compiler<'a> {
             lights,
             all_asked,
             uneven_asked,
-            light_exponent: 0,
-            length_exponent: 0,
+            light_powers: Powers::default(),
+            length_powers: Powers::default(),
             has_sky: d.lights.iter().any(written::Light::is_around),
             dark,
             light_groups: lights::groups(d, &light_names),
@@ -345,8 +346,8 @@ impl<'a> Compiler<'a> {
         };
         // What follows from the whole, and what a person should know of it.
         self.note_beside(&mut scene, &boxes, &light_names);
-        scene.light_exponent = scene.film_exponent(&powers, ambient, &boxes);
-        scene.length_exponent = scene.sums_of_lengths_exponent();
+        scene.light_powers = scene.powers_of_light(&powers, ambient, &boxes);
+        scene.length_powers = scene.powers_of_lengths();
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);

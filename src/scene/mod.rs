@@ -10,7 +10,7 @@ mod apart;
 mod around;
 pub mod bands;
 mod beside;
-mod brightness;
+pub mod brightness;
 pub mod bundle;
 pub mod bvh;
 pub mod camera;
@@ -50,6 +50,7 @@ pub mod watch;
 use crate::math::sampler::{Octet, Sampler, Set, unit};
 use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
+use brightness::Powers;
 use bvh::{Aabb, Bvh};
 use camera::Camera;
 use choice::Asked;
@@ -118,10 +119,10 @@ pub struct Scene {
     pub lamps: Lamps,
     /// Lamps toward which distances in media may be drawn; none where they are many.
     pub near_lamps: Vec<equiangular::Lamp>,
-    /// The film counts light over two to this power: `scene/brightness.rs` tells which.
-    pub light_exponent: i32,
-    /// And sums count lengths over two to this power.
-    pub length_exponent: i32,
+    /// By which powers of two sums count light.
+    pub light_powers: Powers,
+    /// And lengths.
+    pub length_powers: Powers,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,
     /// Whether a light from infinity was written, be it with no power: what `opaque_sky` covers all with.

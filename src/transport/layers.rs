@@ -14,6 +14,7 @@ use super::ways::{Way, Ways};
 use crate::description::Quantity;
 use crate::film::layers::{Kept, Layout};
 use crate::scene::Scene;
+use crate::scene::brightness::Powers;
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, illuminant};
 
 /// How light is written.
@@ -88,10 +89,10 @@ pub struct LayerPlan {
     pub in_xyz: bool,
     /// Factor on light, as on the picture's own.
     pub sensitivity: f64,
-    /// Light is counted over two to this power, as the film counts it: sums hold so much only.
-    pub exponent: i32,
-    /// Lengths are counted over two to this power.
-    pub length_exponent: i32,
+    /// Light is counted over these powers of two, as the film counts it: sums hold so much only.
+    pub light: Powers,
+    /// Lengths are counted over these.
+    pub lengths: Powers,
     /// Whether the picture's own integrator gives distances, which are no light.
     pub distances: bool,
     /// How far apart samples of a pixel stand, in pixels: 1/√n.
@@ -111,8 +112,8 @@ impl Default for LayerPlan {
             white: illuminant::d65(),
             in_xyz: false,
             sensitivity: 1.0,
-            exponent: 0,
-            length_exponent: 0,
+            light: Powers::default(),
+            lengths: Powers::default(),
             distances: false,
             sample_distance: 1.0,
             mattes: false,
@@ -182,27 +183,28 @@ impl LayerPlan {
         Layout { channels, kept: self.kept }
     }
 
-    /// Two to which power the numbers of `source` are counted over.
-    fn exponent_of(&self, source: &Source) -> i32 {
+    /// Over which powers of two the numbers of `source` are counted.
+    fn powers_of(&self, source: &Source) -> Powers {
         match source {
-            Source::Light(None, _) | Source::Band(_) if self.distances => self.length_exponent,
-            Source::Light(Some(i), _) if matches!(self.integrators[*i], Integrator::Depth) => self.length_exponent,
+            Source::Light(None, _) | Source::Band(_) if self.distances => self.lengths,
+            Source::Light(Some(i), _) if matches!(self.integrators[*i], Integrator::Depth) => self.lengths,
             Source::Surface(Quantity::Depth | Quantity::Position)
-            | Source::Seen(Quantity::Depth | Quantity::Position) => self.length_exponent,
-            Source::Light(..) | Source::Band(_) | Source::Ways(..) => self.exponent,
-            Source::Surface(_) | Source::Seen(_) | Source::Numerics | Source::Middle(_) => 0,
+            | Source::Seen(Quantity::Depth | Quantity::Position) => self.lengths,
+            Source::Light(..) | Source::Band(_) | Source::Ways(..) => self.light,
+            Source::Surface(_) | Source::Seen(_) | Source::Numerics | Source::Middle(_) => Powers::default(),
         }
     }
 
     /// What the numbers of `source` are multiplied by on their way to the sums.
     fn unit_of(&self, source: &Source) -> f32 {
-        one_over_two_to(self.exponent_of(source))
+        one_over_two_to(self.powers_of(source).exponent)
     }
 
     /// And the light of a further `integrator`.
     #[must_use]
     pub fn unit_of_integrator(&self, integrator: &Integrator) -> f32 {
-        one_over_two_to(if matches!(integrator, Integrator::Depth) { self.length_exponent } else { self.exponent })
+        let powers = if matches!(integrator, Integrator::Depth) { self.lengths } else { self.light };
+        one_over_two_to(powers.exponent)
     }
 
     /// The sensitivity as a number from 1 to 2, by which samples of light are multiplied, and two to the power by which their
@@ -250,8 +252,7 @@ impl LayerPlan {
                 [Some((&layer.name, false)), layer.squares.as_ref().map(|name| (name, true))].into_iter().flatten()
             {
                 let unless_squared = |holds| if squared { Holds::Data } else { holds };
-                let exponent = self.exponent_of(&layer.source);
-                let lowered = lowered(exponent);
+                let Powers { exponent, squared: lowered } = self.powers_of(&layer.source);
                 let gain = if matches!(layer.source, Source::Light(..) | Source::Ways(..)) { self.gain().1 } else { 0 };
                 let exponent = exponent + gain;
                 let exponent = if squared { 2 * (exponent + lowered) } else { exponent };
@@ -282,12 +283,6 @@ impl LayerPlan {
         }
         all
     }
-}
-
-/// By how many more powers of two numbers that are counted over two to the power `exponent` are divided before they are squared: where
-/// light is bright, sums hold the squares of all numbers that they hold, (2³⁸ / 2²⁰)² = 2³⁶.
-fn lowered(exponent: i32) -> i32 {
-    if exponent > 0 { 20 } else { 0 }
 }
 
 /// A power of two, within what f32 holds.

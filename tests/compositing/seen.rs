@@ -386,6 +386,63 @@ fn layers_and_bands_hold_what_the_picture_holds() {
     }
 }
 
+/// A sky of L and a film of the sensitivity s show s L, and the mean of its squares stands to the square of the mean as in any
+/// other light: the same samples, times a number. Each is rounded to f32 some dozen times, and counts twice in its square: 32
+/// roundings of 2⁻²⁴ cover that. A floor 6e5 m away is as far in all samples. Where floats do not hold the squares, that is told.
+#[test]
+fn squares_are_those_of_any_light_and_length() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let picture = |sky: f64, sensitivity: f64, rest: &str| {
+        let text = format!(
+            "camera: {{origin: [0, 0, 6e5], target: [0, 0, 0], orthographic_height: 4}}\n\
+             image: {{width: 4, height: 4, sensitivity: {sensitivity:e}}}\nrender: {{samples: 16}}\n\
+             output: {{exr: {{precision: float}}}}\nlights: [{{constant: {{radiance: {sky:e}}}}}]\n{rest}"
+        );
+        common::write(&path("s.yaml"), text.as_bytes());
+        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        let told = report.scenes[0].notes.iter().find(|note| note.contains("layer m2_own")).cloned();
+        (read_exr(&path("out.exr")).unwrap().parts.remove(0), told)
+    };
+    let near = |x: f32, y: f32| (x / y - 1.0).abs() <= 32.0 * 2f32.powi(-24);
+    let mut first = None;
+    for (sky, sensitivity) in [
+        (1.0, 1.0),
+        (20.0, 1.0),
+        (5e5, 1.0),
+        (1e6, 1.0),
+        (1e18, 1.0),
+        (1.0, 1e-16),
+        (1e-16, 1e16),
+        (3e-30, 3e30),
+        (3e30, 3e-30),
+    ] {
+        let (part, told) = picture(sky, sensitivity, "layers: [{name: own, light: path, squares: true}]\n");
+        assert_eq!(told, None, "{sky:e}, {sensitivity:e}");
+        let of = |name: &str| -> Vec<f32> {
+            let planes = ["R", "G", "B"].map(|colour| plane(&part, &format!("{name}{colour}")));
+            planes.concat()
+        };
+        let (shown, own, squares) = (of(""), of("own."), of("m2_own."));
+        assert!(shown.iter().zip(&own).all(|(x, y)| near(*x, *y)), "{sky:e}, {sensitivity:e}: {shown:?} {own:?}");
+        let found: Vec<f32> = squares.iter().zip(&own).map(|(square, mean)| square / mean / mean).collect();
+        let first = first.get_or_insert_with(|| found.clone());
+        let alike = found.iter().zip(&*first).all(|(x, y)| near(*x, *y));
+        assert!(alike && found[0] >= 1.0, "{sky:e}, {sensitivity:e}: {found:?}, not {first:?}");
+    }
+    let (_, told) = picture(1e20, 1.0, "layers: [{name: own, light: path, squares: true}]\n");
+    let beyond = "layer m2_own: 48 values are more than 32-bit floats hold: they are written as infinite";
+    assert_eq!(told.as_deref(), Some(beyond));
+    let (_, told) = picture(1e-20, 1.0, "layers: [{name: own, light: path, squares: true}]\n");
+    let below = "layer m2_own: all values are less than 32-bit floats hold with all digits (1.2e-38)";
+    assert_eq!(told.as_deref(), Some(below));
+    let far = "layers: [{name: far, surface: depth, squares: true}]\nshapes: [{plane: {normal: [0, 0, 1]}}]\n";
+    let (part, _) = picture(1.0, 1.0, far);
+    assert!(plane(&part, "m2_far.T").iter().all(|square| near(*square, 3.6e11)), "{:?}", plane(&part, "m2_far.T"));
+}
+
 /// Nearly smooth glass throws a caustic, whether paths from the lights or from the camera find it: what is not caustic has the
 /// same mean, 0.0084, with both. It has little noise: 1 % at 256 samples of 384 pixels is ten standard errors.
 #[test]

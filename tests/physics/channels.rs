@@ -107,8 +107,13 @@ fn squares_are_second_moments() {
          layers:\n- {{name: a, squares: true}}\n- {{name: b, form: xyz, squares: true, light: {{path: {{hide_emitters: true}}}}}}\n\
          shapes:\n- disk: {{normal: [0, 0, 1], radius: 0.8, emission: 3, material: {{diffuse: {{reflectance: 0}}}}}}\n"
     );
-    let frame = render_with(&bench_with(&scene, &[]).grey(), Filter::Box, 32);
-    let plane = |channel| frame.layer(channel);
+    let bench = bench_with(&scene, &[]).grey();
+    let frame = render_with(&bench, Filter::Box, 32);
+    let channels = bench.prepared.plan.layers.channels();
+    let plane = |channel: usize| {
+        let unit = 2f32.powi(channels[channel].exponent);
+        frame.layer(channel).iter().map(|x| x * unit).collect::<Vec<f32>>()
+    };
     assert_eq!(plane(3), plane(7));
     assert!(plane(3).iter().any(|a| *a > 0.2 && *a < 0.8));
     // The middle pixels see the lamp alone; the hidden lamp is black.

@@ -1,7 +1,7 @@
 //! The numbers that the layers of a picture have of each sample.
 
 use super::first::First;
-use super::{Form, NUMERICS, Source, in_band, lowered, one_over_two_to, rgb};
+use super::{Form, NUMERICS, Source, in_band, one_over_two_to, rgb};
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::math::Ray;
 use crate::scene::Scene;
@@ -117,7 +117,7 @@ impl Values {
         let (gain, _) = layers.gain();
         for layer in &layers.layers {
             let unit = layers.unit_of(&layer.source);
-            let squares = layer.squares.is_some().then(|| one_over_two_to(lowered(layers.exponent_of(&layer.source))));
+            let squares = layer.squares.is_some().then(|| one_over_two_to(layers.powers_of(&layer.source).squared));
             match layer.source {
                 Source::Surface(quantity) | Source::Seen(quantity) => {
                     let count = quantity.components().len();
