@@ -205,8 +205,8 @@ fn adaptive_sampling_is_off_where_it_would_not_be_exact() {
 ///
 /// With each half's number told by what it shows itself the test fails: z −4.4 and 1.41, and −9.1 and 1.67 for 1000 renders of
 /// 16 samples, where halves told by each other have 0.7 and 0.97. Under the Gaussian, whose samples count for several pixels, halves that make
-/// up for what their weights lack by each other's light have −12 over 100 renders of 40 × 32 pixels; of its pixels, which are not independent
-/// of each other, only the mean is held.
+/// up for what their weights lack by each other's light have z −3.7 over 200 renders; of its pixels, which are not independent of each
+/// other, only the mean is held.
 #[test]
 fn the_mean_of_adaptive_renders_is_that_of_uniform_ones() {
     let renders: u64 = if std::env::var_os("ABBE_NIGHTLY").is_some() { 1000 } else { 400 };
