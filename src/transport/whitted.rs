@@ -20,6 +20,7 @@ use crate::scene::environment::Drawn;
 use crate::scene::light::{Light, free};
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, metal, relative_index};
 use crate::scene::shape::Shape;
+use crate::scene::shape::sphere::Middle;
 use crate::scene::texture::Texture;
 use crate::scene::{Geometry, Inside, Object, Scene};
 use crate::spectrum::{LANES, Lanes, RefractiveIndex, SampledWavelengths};
@@ -282,9 +283,9 @@ impl Tracer<'_> {
             && let Object { geometry: Geometry::Shape(Shape::Sphere(sphere)), flipped: false, .. } =
                 &self.scene.objects[*object as usize]
         {
-            let (wi, distance, solid_angle) = sphere.toward_middle(from)?;
+            let Middle { direction, distance, projected } = sphere.toward_middle(from)?;
             let target = Some(Departure::new(*object, 0));
-            return Some((wi, radiance.eval(self.nm) * solid_angle as f32, distance, target));
+            return Some((direction, radiance.eval(self.nm) * projected as f32, distance, target));
         }
         let a = light.arriving(&self.scene.objects, from, None, DVec2::splat(0.5), Drawn::All, self.nm)?;
         let irradiance = match a.density {

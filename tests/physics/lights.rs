@@ -213,14 +213,17 @@ fn a_sphere_lights_a_floor_at_every_distance() {
     }
 }
 
-/// The recursive tracer has one ray a lamp: a small lamp is right, and shadows are hard.
+/// The recursive tracer has one ray to a ball, along its axis: ∫ ω dω over a cone lies there, π sin² long, so that one ray is all of
+/// the light as long as the ball stands above the horizon.
 #[test]
-fn whitted_lights_by_the_solid_angle_of_a_small_lamp() {
-    let s = 1e-3;
-    let lamp = format!("- sphere: {{center: [0, 1, 0], radius: {s}, {LAMP}}}");
-    let found = floor("{whitted: {}}", "[]", &lamp).look(v(0.0, 0.05, 0.3), v(0.0, 0.0, 0.0));
-    // Light from the middle of the cone stands for all of it: off by s²/4 of itself.
-    assert_close(found, 0.6 * s * s, 2e-6);
+fn whitted_lights_by_all_of_a_ball_at_any_distance() {
+    for s in [0.9, 0.5, 0.1, 1e-3, 1e-6] {
+        let (x, y) = if s > 0.4 { (0.0, 1.0) } else { (0.75f64.sqrt(), 0.5) };
+        let lamp = format!("- sphere: {{center: [{x}, {y}, 0], radius: {s}, {LAMP}}}");
+        let found = floor("{whitted: {}}", "[]", &lamp).look(v(0.0, 0.05, 0.3), v(0.0, 0.0, 0.0));
+        // Five roundings to f32.
+        assert_close(found, 0.6 * s * s * y, 5.0 * f64::from(f32::EPSILON));
+    }
 }
 
 /// From far away a lamp of radiance 1 is a point whose intensity is its projected area, whatever its form:

@@ -186,12 +186,16 @@ impl Sphere {
         Some(Cap { axis: to_center / distance, distance, power, one_minus_cos })
     }
 
-    /// Unit direction to the middle of the sphere, distance to the point nearest to `from`, and solid
-    /// angle in sr; `None` from inside or on it.
+    /// The sphere from `from` as one point; `None` from inside or on it.
     #[must_use]
-    pub fn toward_middle(&self, from: DVec3) -> Option<(DVec3, f64, f64)> {
+    pub fn toward_middle(&self, from: DVec3) -> Option<Middle> {
         let cap = self.cone(from)?;
-        Some((cap.axis, cap.power / (cap.distance + self.radius), TAU * cap.one_minus_cos))
+        let sine = self.radius / cap.distance;
+        Some(Middle {
+            direction: cap.axis,
+            distance: cap.power / (cap.distance + self.radius),
+            projected: PI * sine * sine,
+        })
     }
 
     /// Uniform in solid angle from outside, uniform on the area from inside.
@@ -242,6 +246,17 @@ impl Sphere {
             None => solid_angle_density(1.0 / self.area(), hit_t, direction.dot(hit_normal)),
         }
     }
+}
+
+/// A sphere as one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Middle {
+    /// To the middle, unit.
+    pub direction: DVec3,
+    /// To the nearest point.
+    pub distance: f64,
+    /// The solid angle by its cosines to `direction`, sr: what radiance is multiplied by for the irradiance across it.
+    pub projected: f64,
 }
 
 /// What a sphere covers of the sky of a point outside it.
