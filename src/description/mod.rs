@@ -54,7 +54,8 @@
 //!                                   #                   hide_emitters: false, count_crossings: false}}: from the
 //!                                   #           lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
-//!                                   #              transparent_shadows: false}},
+//!                                   #              transparent_shadows: false}}: rectangles, disks and balls shine from
+//!                                   #           their middle, other lamps from 60 points,
 //!                                   #   depth: the distance to the first surface, m, as light that is even over the spectrum: Y
 //!                                   #           is it, red, green and blue are 1.2, 0.95 and 0.91 of it; none: black
 //!                                   # max_depth of a path counts segments: 1 emission, 2 direct light;

@@ -2,10 +2,11 @@
 //! Display": an ambient term, for each light a hard shadow and a highlight, mirrors and glass by
 //! recursion. No random numbers; spectral like the rest.
 //!
-//! Lights with area shine from the middle of their surface; light from infinity is seen, and reaches
-//! surfaces through the ambient term only. Glass reflects and refracts by Fresnel's shares; where its
-//! index depends on the wavelength, each wavelength goes on alone after the first refraction. Media that are the same
-//! everywhere and only absorb dim what crosses them (Beer and Lambert); others are left out.
+//! Flat lamps and balls shine from their middle, other lamps with area from [`POINTS`] points, each with a shadow of
+//! its own; light from infinity is seen, and reaches surfaces through the ambient term only. Glass reflects and
+//! refracts by Fresnel's shares; where its index depends on the wavelength, each wavelength goes on alone after the first
+//! refraction. Media that are the same everywhere and only absorb dim what crosses them (Beer and Lambert); others are
+//! left out.
 
 use super::Incoming;
 use super::path::seen_normal;
@@ -17,13 +18,13 @@ use crate::optics::dielectric::{RelativeIndex, Tint, refract};
 use crate::optics::fresnel::{self, Model};
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
 use crate::scene::environment::Drawn;
-use crate::scene::light::{Light, free};
+use crate::scene::light::{Arriving, Light, free};
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, metal, relative_index};
 use crate::scene::shape::Shape;
-use crate::scene::shape::sphere::Middle;
+use crate::scene::shape::sphere::{Middle, Sphere};
 use crate::scene::texture::Texture;
 use crate::scene::{Geometry, Inside, Object, Scene};
-use crate::spectrum::{LANES, Lanes, RefractiveIndex, SampledWavelengths};
+use crate::spectrum::{LANES, Lanes, RefractiveIndex, SampledWavelengths, Spectrum};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -31,6 +32,10 @@ use std::f64::consts::PI;
 /// recursion must end by light as well as by depth; what is lost is at most this share of the
 /// brightest radiance in the scene for each branch that is cut.
 const FAINTEST: f32 = 1.0 / 65_536.0;
+
+/// How many points stand for a lamp that is neither flat nor a ball: as many for each of the 1, 2, 3 or, from inside, 6 faces of a
+/// cube that are seen.
+const POINTS: u32 = 60;
 
 /// Light that arrives along a camera ray.
 #[must_use]
@@ -248,51 +253,83 @@ impl Tracer<'_> {
             return light;
         }
         for source in &self.scene.lights {
-            let Some((wi, irradiance, distance, target)) = self.toward(source, surface.point) else { continue };
-            let cos = wi.dot(normal);
-            if cos <= 0.0 || wi.dot(surface.normal) * wo.dot(surface.normal) <= 0.0 {
-                continue;
+            let count = self.points(source);
+            let share = (1.0 / f64::from(count)) as f32;
+            for k in 0..count {
+                let u = (DVec2::new(f64::from(k), f64::from(row(k))) + 0.5) / f64::from(count);
+                let Some(arriving) = self.toward(source, surface.point, u) else { continue };
+                let Arriving { wi, distance, radiance: irradiance, target, .. } = arriving;
+                let cos = wi.dot(normal);
+                if cos <= 0.0 || wi.dot(surface.normal) * wo.dot(surface.normal) <= 0.0 {
+                    continue;
+                }
+                let ray = leave(wi);
+                let distance = free(distance, target, surface.point, &ray);
+                let through = self.unshadowed(&ray, standpoint.here, distance, target);
+                if !through.simd_gt(Lanes::ZERO).any() {
+                    continue;
+                }
+                let mut reflected = base * (cos * slopes.shadowing(wi) / PI) as f32;
+                if let Some(h) = &material.highlight {
+                    reflected += Lanes::splat(highlight(h, normal, wo, wi) as f32);
+                }
+                light += reflected * irradiance * through * share;
             }
-            let ray = leave(wi);
-            let distance = free(distance, target, surface.point, &ray);
-            let through = self.unshadowed(&ray, standpoint.here, distance, target);
-            if !through.simd_gt(Lanes::ZERO).any() {
-                continue;
-            }
-            let mut reflected = base * (cos * slopes.shadowing(wi) / PI) as f32;
-            if let Some(h) = &material.highlight {
-                reflected += Lanes::splat(highlight(h, normal, wo, wi) as f32);
-            }
-            light += reflected * irradiance * through;
         }
         light
     }
 
-    /// Direction, irradiance across it, distance and primitive of a light, as a single point.
-    fn toward(&self, light: &Light, from: DVec3) -> Option<(DVec3, Lanes, f64, Option<Departure>)> {
+    /// How many points stand for a lamp: one where that is its middle, or all of it that a point may see.
+    fn points(&self, light: &Light) -> u32 {
+        let (Light::Area { object, .. } | Light::AlongNormal { object, .. }) = light else { return 1 };
+        let lamp = &self.scene.objects[*object as usize];
+        match &lamp.geometry {
+            Geometry::Shape(Shape::Rectangle(_) | Shape::Disk(_)) => 1,
+            // From outside a convex shape one of its normals comes at the most.
+            Geometry::Shape(_) if !lamp.flipped && matches!(light, Light::AlongNormal { .. }) => 1,
+            _ if self.ball(light).is_some() => 1,
+            _ => POINTS,
+        }
+    }
+
+    /// The object and form of a ball that shines evenly outward, and its radiance.
+    fn ball<'a>(&'a self, light: &'a Light) -> Option<(u32, &'a Sphere, &'a Spectrum)> {
+        let Light::Area { object, radiance: Texture::Uniform(radiance) } = light else { return None };
+        match &self.scene.objects[*object as usize] {
+            Object { geometry: Geometry::Shape(Shape::Sphere(sphere)), flipped: false, .. } => {
+                Some((*object, sphere, radiance))
+            }
+            _ => None,
+        }
+    }
+
+    /// The irradiance that all of a light would give if it were where `u` says, across the way there.
+    fn toward(&self, light: &Light, from: DVec3, u: DVec2) -> Option<Arriving> {
         if let Light::Environment(map) = light
-            && let Some((wi, irradiance)) = map.sun(self.nm)
+            && let Some((wi, radiance)) = map.sun(self.nm)
         {
-            return Some((wi, irradiance, f64::INFINITY, None));
+            return Some(Arriving { wi, distance: f64::INFINITY, radiance, density: None, target: None });
         }
         if light.is_environment() {
             return None;
         }
         // The middle of a sphere, which is the point nearest to the receiver, needs no sampling.
-        if let Light::Area { object, radiance: Texture::Uniform(radiance) } = light
-            && let Object { geometry: Geometry::Shape(Shape::Sphere(sphere)), flipped: false, .. } =
-                &self.scene.objects[*object as usize]
-        {
+        if let Some((object, sphere, radiance)) = self.ball(light) {
             let Middle { direction, distance, projected } = sphere.toward_middle(from)?;
-            let target = Some(Departure::new(*object, 0));
-            return Some((direction, radiance.eval(self.nm) * projected as f32, distance, target));
+            let radiance = radiance.eval(self.nm) * projected as f32;
+            return Some(Arriving {
+                wi: direction,
+                distance,
+                radiance,
+                density: None,
+                target: Some(Departure::new(object, 0)),
+            });
         }
-        let a = light.arriving(&self.scene.objects, from, None, DVec2::splat(0.5), Drawn::All, self.nm)?;
-        let irradiance = match a.density {
-            None => a.radiance,
-            Some(density) => a.radiance * (1.0 / density) as f32,
-        };
-        Some((a.wi, irradiance, a.distance, a.target))
+        let a = light.arriving(&self.scene.objects, from, None, u, Drawn::All, self.nm)?;
+        Some(match a.density {
+            None => a,
+            Some(density) => Arriving { radiance: a.radiance * (1.0 / density) as f32, density: None, ..a },
+        })
     }
 
     /// What light keeps over `distance` through the medium that it is in.
@@ -527,6 +564,12 @@ impl Bounce<'_> {
             }
         }
     }
+}
+
+/// The row of the `k`-th of [`POINTS`] columns in which its point lies: the digits of k to the bases 2, 2, 5 and 3, the last first, as
+/// in Hammersley's points (Niederreiter 1992, section 3.1).
+fn row(k: u32) -> u32 {
+    30 * (k % 2) + 15 * (k / 2 % 2) + 3 * (k / 4 % 5) + k / 20
 }
 
 /// Whether a ray of which `weight` reaches the eye is followed.

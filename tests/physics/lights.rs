@@ -226,6 +226,44 @@ fn whitted_lights_by_all_of_a_ball_at_any_distance() {
     }
 }
 
+/// A matt disc in the middle of a lamp that shines inward has an upper half space of radiance 1, whatever the form: E = π. Of points
+/// of a ball the cosine, none below, has the mean 1/4 and the mean square 1/6, so that 60 random ones give it to
+/// √(1/6 − 1/16) / (1/4 √60) = 0.17 of itself; evenly spread ones shall be four times as good, in what is less round, too.
+#[test]
+fn whitted_lights_the_inside_of_a_lamp() {
+    let mut ball = String::new();
+    let (rows, columns) = (24, 48);
+    for i in 0..=rows {
+        let theta = PI * f64::from(i) / f64::from(rows);
+        for j in 0..columns {
+            let phi = 2.0 * PI * f64::from(j) / f64::from(columns);
+            ball += &format!("v {} {} {}\n", theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+        }
+    }
+    for i in 0..rows {
+        for j in 0..columns {
+            let at = |i: i32, j: i32| i * columns + j % columns + 1;
+            // Facing inward.
+            ball += &format!("f {} {} {} {}\n", at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+        }
+    }
+    let lamps = [
+        "sphere: {radius: 2, flip_normals: true",
+        "cube: {size: 4, flip_normals: true",
+        "cylinder: {base: [0, -2, 0], top: [0, 2, 0], radius: 2, flip_normals: true",
+        "mesh: {file: ball.obj, transform: [{scale: 2}]",
+    ];
+    for lamp in lamps {
+        let text = format!(
+            "{}integrator: {{whitted: {{}}}}\nshapes:\n\
+             - disk: {{normal: [0, 1, 0], radius: 0.4, material: {{diffuse: {{reflectance: 0.6}}}}}}\n- {lamp}, {LAMP}}}\n",
+            super::common::CAMERA
+        );
+        let scene = super::common::bench_with(&text, &[("ball.obj", ball.as_bytes())]);
+        assert_close(scene.look(v(0.1, 0.5, 0.3), v(0.0, 0.0, 0.0)), 0.6, 0.042);
+    }
+}
+
 /// From far away a lamp of radiance 1 is a point whose intensity is its projected area, whatever its form:
 /// a wrong area, density or choice of faces shows.
 #[test]
@@ -246,15 +284,17 @@ fn every_shape_lights_a_far_floor_by_its_projected_area() {
         ),
     ];
     for (lamp, area) in lamps {
-        let scene = floor("path", "[]", &format!("- {lamp}"));
-        // Corrections are of the order of size over distance.
-        let found = scene.estimate(&ray(v(0.0, 1.0, 1.0), v(0.0, 0.0, 0.0)), 4096);
         let expected = 0.6 / PI * area / (far * far);
+        let (from, to) = (v(0.0, 1.0, 1.0), v(0.0, 0.0, 0.0));
+        // Corrections are of the order of size over distance.
+        let found = floor("path", "[]", &format!("- {lamp}")).estimate(&ray(from, to), 4096);
         assert!(
             (found.mean / expected - 1.0).abs() < 4.0 * found.error / expected + 3e-3,
             "{lamp}: {expected} {found:?}"
         );
         assert!(found.error < 0.02 * expected, "{lamp}: {found:?}");
+        // The middles of 60 rows of a cosine over half a turn miss its mean by (π/60)²/24 of itself.
+        assert_close(floor("{whitted: {}}", "[]", &format!("- {lamp}")).look(from, to), expected, 3e-3);
     }
 }
 
@@ -271,18 +311,25 @@ fn a_mesh_lights_a_floor_as_its_form_does() {
         // Facing down.
         obj += &format!("f 1 {} {}\n", i + 2, (i + 1) % n + 2);
     }
-    let text = format!(
-        "{}shapes:\n- plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
-         - mesh: {{file: disc.obj, {LAMP}}}\n",
-        super::common::CAMERA
-    );
-    let scene = super::common::bench_with(&text, &[("disc.obj", obj.as_bytes())]);
+    let scene = |integrator: &str| {
+        let text = format!(
+            "{}integrator: {integrator}\nshapes:\n- plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
+             - mesh: {{file: disc.obj, {LAMP}}}\n",
+            super::common::CAMERA
+        );
+        super::common::bench_with(&text, &[("disc.obj", obj.as_bytes())])
+    };
     // A regular polygon: n triangles between the middle and an edge at distance a = cos(π/n), each with
     // F = (a/√(a²+h²)) atan(tan(π/n) a / √(a²+h²)) / π.
     let a = (PI / f64::from(n)).cos();
     let root = (a * a + 1.0).sqrt();
     let f = f64::from(n) / PI * a / root * ((PI / f64::from(n)).tan() * a / root).atan();
-    scene.estimate(&ray(v(0.0, 0.2, 0.3), v(0.0, 0.0, 0.0)), 8192).assert_is(0.6 * f, 2e-3);
+    let (from, to) = (v(0.0, 0.2, 0.3), v(0.0, 0.0, 0.0));
+    scene("path").estimate(&ray(from, to), 8192).assert_is(0.6 * f, 2e-3);
+    // With the distance r from its middle a point of the disc gives 1/(1 + r²)², of mean 1/2 and mean square 7/24: of 60 random ones
+    // the mean is good to √(1/6) / √60 = 0.053 of itself. Those of `whitted`, of which one number says in which triangle and where
+    // in it, shall be twice as good.
+    assert_close(scene("{whitted: {}}").look(from, to), 0.6 * f, 0.027);
 }
 
 /// Two lamps add, and a lamp behind a wall does not.
