@@ -207,7 +207,8 @@ impl Tracer<'_> {
         if matches!(material.kind, Kind::Boundary) {
             return Sent { light: Lanes::ZERO, straight: 1.0 };
         }
-        if !outside && material.two_sided {
+        // A thin sheet is the same from both sides.
+        if !outside && (material.two_sided || matches!(material.kind, Kind::PrincipledThin(_))) {
             standing.mirror();
         }
         if !outside && !standing.is_mirrored() && !material.transmits() {
@@ -226,7 +227,8 @@ impl Tracer<'_> {
     fn shade(&self, seen: &Seen) -> Lanes {
         let Seen { x: &Vertex { surface, hit, at, wo, .. }, standpoint, material, normal, slopes } = *seen;
         let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
-        let base = match &material.kind {
+        let mut translucent = Lanes::ZERO;
+        let matte = match &material.kind {
             Kind::Diffuse { reflectance } => reflectance.eval(at, self.nm),
             Kind::Plastic { reflectance, coat, nonlinear, .. } => {
                 // The base under its coat, for light along the normal both ways.
@@ -235,7 +237,11 @@ impl Tracer<'_> {
                 base.albedo() * t * t
             }
             Kind::Principled(solid) => solid.at(at, self.nm).smooth(1.0, true).matte,
-            Kind::PrincipledThin(sheet) => sheet.at(at, self.nm).smooth(1.0).matte,
+            Kind::PrincipledThin(sheet) => {
+                let parts = sheet.at(at, self.nm).smooth(1.0);
+                translucent = parts.translucent;
+                parts.matte
+            }
             // Hair is shown matte, in the colour of light that crosses its middle.
             Kind::Hair { absorption, .. } => {
                 (absorption.iter().fold(Lanes::ZERO, |sum, s| sum + s.eval(self.nm)) * -2.0).exp()
@@ -247,9 +253,9 @@ impl Tracer<'_> {
             | Kind::Boundary
             | Kind::Compound(_) => Lanes::ZERO,
         };
-        let diffuse = base.simd_gt(Lanes::ZERO).any();
-        let mut light = base * self.settings.ambient.eval(self.nm);
-        if !diffuse && material.highlight.is_none() {
+        let (diffuse, sheer) = (matte.simd_gt(Lanes::ZERO).any(), translucent.simd_gt(Lanes::ZERO).any());
+        let mut light = (matte + translucent) * self.settings.ambient.eval(self.nm);
+        if !diffuse && !sheer && material.highlight.is_none() {
             return light;
         }
         for source in &self.scene.lights {
@@ -260,20 +266,24 @@ impl Tracer<'_> {
                 let Some(arriving) = self.toward(source, surface.point, u) else { continue };
                 let Arriving { wi, distance, radiance: irradiance, target, .. } = arriving;
                 let cos = wi.dot(normal);
-                if cos <= 0.0 || wi.dot(surface.normal) * wo.dot(surface.normal) <= 0.0 {
-                    continue;
-                }
+                let reflects = cos > 0.0;
+                // Light of which a leaning shading normal says another side than the true one is lost, as in `path`.
+                let (albedo, inside) = match wi.dot(surface.normal) * wo.dot(surface.normal) > 0.0 {
+                    true if reflects => (matte, standpoint.here),
+                    false if !reflects && sheer => (translucent, standpoint.beyond),
+                    _ => continue,
+                };
                 let ray = leave(wi);
                 let distance = free(distance, target, surface.point, &ray);
-                let through = self.unshadowed(&ray, standpoint.here, distance, target);
+                let through = self.unshadowed(&ray, inside, distance, target);
                 if !through.simd_gt(Lanes::ZERO).any() {
                     continue;
                 }
-                let mut reflected = base * (cos * slopes.shadowing(wi) / PI) as f32;
-                if let Some(h) = &material.highlight {
-                    reflected += Lanes::splat(highlight(h, normal, wo, wi) as f32);
+                let mut sent = albedo * (cos.abs() * slopes.shadowing(wi) / PI) as f32;
+                if let Some(h) = material.highlight.as_ref().filter(|_| reflects) {
+                    sent += Lanes::splat(highlight(h, normal, wo, wi) as f32);
                 }
-                light += reflected * irradiance * through * share;
+                light += sent * irradiance * through * share;
             }
         }
         light

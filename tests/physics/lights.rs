@@ -264,6 +264,37 @@ fn whitted_lights_the_inside_of_a_lamp() {
     }
 }
 
+/// A sheet that scatters to both sides, seen and lit along its normal from either: of Burley's diffuse lobe there is Lambert's
+/// share/π, of what does not cross on the one side and of what does on the other.
+#[test]
+fn thin_principled_sheets_scatter_light_to_both_sides() {
+    for crossing in [0.0, 0.5, 2.0] {
+        for (seen, lit) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            let text = |integrator: &str| {
+                bench(&format!(
+                    "integrator: {integrator}\nlights: [{{directional: {{direction: [0, 0, {}], irradiance: 3}}}}]\nshapes:\n\
+                     - rectangle: {{corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: {{principled_thin: \
+                       {{base_color: 0.5, roughness: 0.5, diff_trans: {crossing}}}}}}}\n",
+                    -lit
+                ))
+            };
+            let share = if seen == lit { 1.0 - 0.5 * crossing } else { 0.5 * crossing };
+            for integrator in INTEGRATORS {
+                let found = text(integrator).look(v(0.1, 0.1, 5.0 * seen), v(0.1, 0.1, 0.0));
+                // Roundings to f32.
+                let expected = 0.5 * share / PI * 3.0;
+                assert!((found - expected).abs() < 1e-6, "{integrator} {crossing} {seen} {lit}: {expected} {found}");
+            }
+        }
+    }
+    // Light from everywhere comes from both sides.
+    let sheet = bench(
+        "integrator: {whitted: {ambient: 1}}\nshapes:\n- rectangle: {corner: [-1, -1, 0], edge_u: [2, 0, 0], \
+         edge_v: [0, 2, 0], material: {principled_thin: {base_color: 0.5, diff_trans: 0.5}}}\n",
+    );
+    assert_close(sheet.look(v(0.1, 0.1, -5.0), v(0.1, 0.1, 0.0)), 0.5, 1e-6);
+}
+
 /// From far away a lamp of radiance 1 is a point whose intensity is its projected area, whatever its form:
 /// a wrong area, density or choice of faces shows.
 #[test]

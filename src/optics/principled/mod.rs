@@ -32,6 +32,8 @@ pub use thin::{PrincipledThin, ThinRates};
 pub struct SmoothParts {
     /// Albedo of the diffuse reflection.
     pub matte: Lanes,
+    /// Albedo of the diffuse transmission.
+    pub translucent: Lanes,
     /// Reflected as by a mirror.
     pub reflected: Lanes,
     /// Transmitted as by smooth glass, as power.

@@ -165,6 +165,7 @@ impl Principled {
         let clear = self.clear() as f32;
         SmoothParts {
             matte: self.base * self.matte() as f32,
+            translucent: Lanes::ZERO,
             reflected: if front {
                 self.reflectance(cos, split.reflected)
             } else {

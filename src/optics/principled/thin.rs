@@ -113,9 +113,10 @@ impl PrincipledThin {
     #[must_use]
     pub fn smooth(&self, cos: f64) -> SmoothParts {
         let (reflected, transmitted) = self.reflectance(cos);
-        let clear = self.transmission;
+        let (clear, crossing) = (self.transmission, self.crossing() as f32);
         SmoothParts {
-            matte: self.base * ((1.0 - clear) * (1.0 - self.crossing() as f32)),
+            matte: self.base * ((1.0 - clear) * (1.0 - crossing)),
+            translucent: self.base * ((1.0 - clear) * crossing),
             reflected: reflected * clear,
             transmitted: self.base * (clear * transmitted as f32),
         }
