@@ -380,6 +380,34 @@ fn transparent_shadows_are_dark_or_light_as_asked() {
     }
 }
 
+/// At a slant a plate of n = 1.5 lets T² of unpolarised light through, T by Fresnel's equations of the angle outside, which has no
+/// critical angle: light that goes in also comes out. A film of the index of the glass is none.
+#[test]
+fn transparent_shadows_of_a_plate_are_those_of_its_two_faces_at_any_angle() {
+    let transmitted = |angle: f64| {
+        let (i, t) = (angle, (angle.sin() / 1.5).asin());
+        let s = (i - t).sin() / (i + t).sin();
+        let p = (i - t).tan() / (i + t).tan();
+        1.0 - 0.5 * (s * s + p * p)
+    };
+    for deg in [20.0f64, 41.0, 42.0, 60.0, 80.0] {
+        let (sin, cos) = deg.to_radians().sin_cos();
+        for film in ["", ", film: {ior: 1.5, thickness_nm: 300}"] {
+            let scene = bench(&format!(
+                "integrator: {{whitted: {{transparent_shadows: true}}}}\n\
+                 lights: [{{directional: {{direction: [{sin}, {}, 0], irradiance: 3}}}}]\nshapes:\n\
+                 - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
+                 - cube: {{center: [0, 1.5, 0], size: [40, 0.2, 40], material: {{dielectric: {{ior: 1.5{film}}}}}}}\n",
+                -cos
+            ));
+            let found = scene.look(v(2.0, 0.2, 0.0), v(0.1, 0.0, 0.0));
+            let expected = transmitted(deg.to_radians()).powi(2) * 0.6 / PI * 3.0 * cos;
+            // A few roundings to f32.
+            assert_close(found, expected, 2e-6);
+        }
+    }
+}
+
 /// A glossy wall across the view, black but for its highlight, and a lamp at (1, 2, 3): strength · cosⁿ · I/d²
 /// at the middle of each pixel, the cosine by Phong (mirrored eye and lamp) or Blinn (normal and half way).
 #[test]

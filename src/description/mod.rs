@@ -55,7 +55,8 @@
 //!                                   #           lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
 //!                                   #              transparent_shadows: false}}: rectangles, disks and balls shine from
-//!                                   #           their middle, other lamps from 60 points,
+//!                                   #           their middle, other lamps from 60 points; transparent_shadows: light goes
+//!                                   #           straight through glass, dimmed as by a plate,
 //!                                   #   depth: the distance to the first surface, m, as light that is even over the spectrum: Y
 //!                                   #           is it, red, green and blue are 1.2, 0.95 and 0.91 of it; none: black
 //!                                   # max_depth of a path counts segments: 1 emission, 2 direct light;

@@ -407,14 +407,12 @@ impl Tracer<'_> {
             {
                 let exterior = around.unwrap_or(exterior);
                 let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
+                // What goes straight on keeps the angle that it has outside, which tells what either face lets through: within
+                // a plate light is bent, and its way out is its way in turned round.
                 let transmitted = match film {
-                    None => index.lanes(|eta| {
-                        let eta = if cos > 0.0 { eta } else { 1.0 / eta };
-                        fresnel::dielectric(*model, cos.abs(), eta).transmitted
-                    }),
+                    None => index.lanes(|eta| fresnel::dielectric(*model, cos.abs(), eta).transmitted),
                     Some(film) => {
-                        let reflected =
-                            film.at(at, self.nm, exterior).over_dielectric(cos.abs(), index.each(), cos > 0.0);
+                        let reflected = film.at(at, self.nm, exterior).over_dielectric(cos.abs(), index.each(), true);
                         Lanes::new(reflected.map(|r| (1.0 - r) as f32))
                     }
                 };
