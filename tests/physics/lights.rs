@@ -295,6 +295,26 @@ fn thin_principled_sheets_scatter_light_to_both_sides() {
     assert_close(sheet.look(v(0.1, 0.1, -5.0), v(0.1, 0.1, 0.0)), 0.5, 1e-6);
 }
 
+/// A black surface under the coat of `principled` in a white sky, looked at along its normal: 0.04 of a mirror, and of the lobe
+/// itself less, as the third of its facets that lean by more than 6° (those of a gloss of 1) send light where it counts less.
+#[test]
+fn whitted_shows_the_coat_of_principled() {
+    let scene = |integrator: &str, strength: f64| {
+        bench(&format!(
+            "integrator: {integrator}\nlights: [{{constant: {{radiance: 1}}}}]\nshapes:\n\
+             - rectangle: {{corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: {{principled: \
+               {{base_color: 0, specular: 0, clearcoat: {strength}, clearcoat_gloss: 1}}}}}}\n"
+        ))
+    };
+    let (from, to) = (v(0.0, 0.0, 5.0), v(0.0, 0.0, 0.0));
+    for strength in [0.0, 0.5, 1.0] {
+        let found = scene("{whitted: {}}", strength).look(from, to);
+        assert!((found - 0.04 * strength).abs() < 1e-7, "{strength}: {found}");
+    }
+    let lobe = scene("path", 1.0).estimate(&ray(from, to), 8192);
+    assert!(lobe.mean > 0.8 * 0.04 && lobe.mean < 0.04 && lobe.error < 1e-3, "{lobe:?}");
+}
+
 /// From far away a lamp of radiance 1 is a point whose intensity is its projected area, whatever its form:
 /// a wrong area, density or choice of faces shows.
 #[test]

@@ -157,8 +157,12 @@ impl Principled {
         sum
     }
 
-    /// What a tracer of single rays shows of it, met at the cosine `cos` > 0: all facets smooth, without coat
-    /// and sheen.
+    /// Reflectance of a facet of the coat, met at the cosine `cos`.
+    fn coat_reflectance(&self, cos: f64) -> f64 {
+        0.04 + 0.96 * lobes::schlick_outside(cos, f64::from(self.eta))
+    }
+
+    /// What a tracer of single rays shows of it, met at the cosine `cos` > 0: all facets smooth, without sheen.
     #[must_use]
     pub fn smooth(&self, cos: f64, front: bool) -> SmoothParts {
         let split = self.interface(cos, front);
@@ -167,7 +171,10 @@ impl Principled {
             matte: self.base * self.matte() as f32,
             translucent: Lanes::ZERO,
             reflected: if front {
-                self.reflectance(cos, split.reflected)
+                // The lobe of the coat over facets so narrow that all see the same cosines: dω = 4 cos dm, and ∫ D cos dm = 1.
+                let up = DVec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
+                let coat = self.coat_reflectance(cos) * CoatFacets::masking(up, up) * cos * cos;
+                self.reflectance(cos, split.reflected) + Lanes::splat(self.clearcoat * coat as f32)
             } else {
                 Lanes::splat(clear * split.reflected as f32)
             },
@@ -247,7 +254,7 @@ impl Principled {
             if facing && self.clearcoat > 0.0 {
                 let coat = self.coat();
                 let density = coat.density(m);
-                let fresnel = 0.04 + 0.96 * lobes::schlick_outside(cos_o, f64::from(self.eta));
+                let fresnel = self.coat_reflectance(cos_o);
                 let masking = CoatFacets::masking(wo, wi);
                 // Without the 1/(4 cos cos) of a microfacet lobe: Burley 2012 scales the coat by 1/4.
                 f += Lanes::splat((0.25 * f64::from(self.clearcoat) * fresnel * density * masking) as f32);
