@@ -2,7 +2,7 @@
 //! Display": an ambient term, for each light a hard shadow and a highlight, mirrors and glass by
 //! recursion. No random numbers; spectral like the rest.
 //!
-//! Flat lamps and balls shine from their middle, other lamps with area from [`POINTS`] points, each with a shadow of
+//! Flat lamps and balls shine from their middle, other lamps with area from 60 points, each with a shadow of
 //! its own; light from infinity is seen, and reaches surfaces through the ambient term only. Glass reflects and
 //! refracts by Fresnel's shares; where its index depends on the wavelength, each wavelength goes on alone after the first
 //! refraction. Media that are the same everywhere and only absorb dim what crosses them (Beer and Lambert); others are
