@@ -136,7 +136,8 @@ fn moments_are_as_many_as_pixels_of_planes_and_skies_that_are_passed() {
 }
 
 /// What comes back to where it was has been on its way: a ball that goes once around at 1.6 m, eight pixels a metre, the outermost corner of
-/// whose box goes 84 of them; the blades of a fan, a quarter of a turn of 1 m at 29 pixels a metre, 46. Of what light and pictures do nobody knows how far it goes.
+/// whose box goes 84 of them; the blades of a fan, a quarter of a turn of 1 m at 29 pixels a metre, 46.
+/// Of what light and pictures do nobody knows how far it goes.
 #[test]
 fn moments_are_as_many_as_pixels_of_ways_that_are_not_straight() {
     let camera = |height: f64| {

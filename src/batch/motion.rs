@@ -16,9 +16,8 @@ use crate::scene::shelf::Shelf;
 use crate::scene::{Geometry, Object, Scene};
 use crate::transport::middle;
 use crate::transport::plan::{Effect, Integrator};
-use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4};
+use glam::{DAffine3, DVec2, DVec3};
 use std::collections::HashSet;
-use std::fmt::Debug;
 use std::sync::Arc;
 
 /// Moments where little moves.
@@ -93,7 +92,7 @@ pub fn moments(
                 let after = if leg == legs { None } else { Some(at(f64::from(leg) / f64::from(legs))?) };
                 let [from, to] = [before.as_ref().unwrap_or(&first), after.as_ref().unwrap_or(&last)];
                 ways.add(&first.1, &from.1, &to.1);
-                slides |= poses(&from.1) != poses(&to.1) || differ(&from.0.textures, &to.0.textures);
+                slides |= poses(&from.1) != poses(&to.1) || from.0.textures != to.0.textures;
                 before = after;
             }
             let way = ways.longest(still);
@@ -156,10 +155,6 @@ fn poses(scene: &Scene) -> Vec<[DVec3; 3]> {
     scene.lights.iter().filter_map(pose).collect()
 }
 
-fn differ<T: Debug>(a: &T, b: &T) -> bool {
-    format!("{a:?}") != format!("{b:?}")
-}
-
 /// How far things travel on the picture, pixels: of each thing points that stand for it, and of what has no end places that are
 /// spread over the picture. What is behind the camera does not count, nor what is there at one moment only.
 #[derive(Default)]
@@ -173,11 +168,7 @@ impl Ways {
     fn add(&mut self, first: &Scene, from: &Scene, to: &Scene) {
         let size = DVec2::from(first.camera.resolution.map(f64::from));
         let places = |scene: &Scene, i: usize| -> Vec<Option<DVec2>> {
-            let ndc_from_world = DMat4::from_cols_array(&scene.camera.ndc_from_world().map(f64::from));
-            let place = |point: DVec3| {
-                let at = ndc_from_world * DVec4::from((point, 1.0));
-                (at.w > 0.0 && at.is_finite()).then(|| DVec2::new(at.x, at.y) / at.w * size)
-            };
+            let place = |point: DVec3| scene.camera.place_of(point).filter(|place| place.is_finite());
             marks(&first.objects[i], &scene.objects[i]).into_iter().map(place).collect()
         };
         let count = first.objects.len().min(from.objects.len()).min(to.objects.len());

@@ -388,7 +388,8 @@ impl BatchEntry {
                 last = samples.iter().position(|name| *name == field).or(last);
             }
             // Samples that are said last bound other targets, too; what is no number of them is told once.
-            let said = root.get("render").and_then(|render| render.get("samples")).filter(|node| holds(node));
+            let holds = |node: &&Node| decode(node, &sources).is_ok_and(|n: u32| (1..=SAMPLES_LIMIT).contains(&n));
+            let said = root.get("render").and_then(|render| render.get("samples")).filter(holds);
             if let (Some(0), true, Some(said)) = (last, has_stop(&root), said.cloned()) {
                 let setting = Setting::new(&samples[2], said.place, said);
                 let set = setting.and_then(|setting| setting.apply(&mut root));
@@ -400,16 +401,6 @@ impl BatchEntry {
 }
 
 /// Whether a scene ends at other targets than its samples, or at samples that stand among them.
-/// Whether a node is a number of samples, however that is spelt.
-fn holds(node: &Node) -> bool {
-    let most = f64::from(SAMPLES_LIMIT);
-    match node.value {
-        Value::Unsigned(n) => (1..=u64::from(SAMPLES_LIMIT)).contains(&n),
-        Value::Float(n) => n.fract() == 0.0 && (1.0..=most).contains(&n),
-        _ => false,
-    }
-}
-
 fn has_stop(root: &Node) -> bool {
     let stop = root.get("render").and_then(|render| render.get("stop"));
     stop.is_some_and(|stop| matches!(&stop.value, Value::Map(targets) if !targets.is_empty()))

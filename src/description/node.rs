@@ -262,13 +262,14 @@ fn near_miss<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> 
         .iter()
         .copied()
         .filter(|candidate| candidate.len() <= 4 * LONGEST)
-        // The distance is no less than the difference of the lengths.
-        .filter(|candidate| {
+        .filter_map(|candidate| {
             let of_candidate = candidate.chars().count();
-            letters.abs_diff(of_candidate) <= (letters.max(of_candidate) / 3).max(1)
+            let most = (letters.max(of_candidate) / 3).max(1);
+            // The distance is no less than the difference of the lengths, and takes longer to tell.
+            let near = letters.abs_diff(of_candidate) <= most;
+            let distance = near.then(|| strsim::damerau_levenshtein(&folded, &candidate.to_lowercase()))?;
+            (distance <= most).then_some((distance, candidate))
         })
-        .map(|candidate| (strsim::damerau_levenshtein(&folded, &candidate.to_lowercase()), candidate))
-        .filter(|(distance, candidate)| *distance <= (letters.max(candidate.chars().count()) / 3).max(1))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
         .or_else(|| begun(&folded, &sorted))

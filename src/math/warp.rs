@@ -88,7 +88,6 @@ pub fn triangle(u: DVec2) -> DVec2 {
 }
 
 /// The middles of n × n equal squares of the unit square, row by row.
-#[cfg(test)]
 pub(crate) fn midpoints(n: u32) -> impl Iterator<Item = DVec2> {
     (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
 }

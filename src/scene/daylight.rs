@@ -381,10 +381,7 @@ const SIDE: u32 = 64;
 /// Directions to a disc about `sun`, of equal solid angles.
 fn over_disc(sun: DVec3, half_angle: f64) -> impl Iterator<Item = DVec3> {
     let frame = Frame::from_normal(sun);
-    (0..SIDE * SIDE).map(move |i| {
-        let u = DVec2::new(f64::from(i % SIDE) + 0.5, f64::from(i / SIDE) + 0.5) / f64::from(SIDE);
-        frame.to_world(warp::uniform_cone(u, one_minus_cos(half_angle)))
-    })
+    warp::midpoints(SIDE).map(move |u| frame.to_world(warp::uniform_cone(u, one_minus_cos(half_angle))))
 }
 
 /// `f` of the turbidities, numbered from 0, around one, linear between.

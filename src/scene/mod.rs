@@ -131,8 +131,8 @@ pub struct Scene {
     pub dark: Vec<String>,
     /// The groups that lights are in.
     pub light_groups: LightGroups,
-    /// Of each object whether what it throws onto others is a caustic, where layers part light; else empty. Mirrors, and glass and metal that
-    /// are smooth or nearly so, as paths from the lights take them. Whether those are used changes nothing about it.
+    /// Of each object whether what it throws onto others is a caustic, where layers part light; else empty. Mirrors, and glass and
+    /// metal that are smooth or nearly so, as paths from the lights take them. Whether those are used changes nothing about it.
     pub sharp: Vec<bool>,
     /// Depth fog of the picture.
     pub fog: Option<DepthFog>,

@@ -125,7 +125,8 @@ fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
     })
 }
 
-/// The primaries that a chunk cHRM states, where they are not those of sRGB to its digits: x and y of white, red, green and blue, times 10⁵.
+/// The primaries that a chunk cHRM states, where they are not those of sRGB to its digits: x and y of white, red, green and blue,
+/// times 10⁵.
 fn other_primaries(content: &[u8]) -> Option<String> {
     const OF_SRGB: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
     let words: Vec<u32> = content.as_chunks().0.iter().map(|word| u32::from_be_bytes(*word)).collect();

@@ -2,11 +2,12 @@
 //!
 //! What it refuses (3.9.1): EXR files with more channels than those of colours, spectral ones among them; of PNM all but `P6`; of BMP
 //! all but 8, 24 and 32 bits without packing behind a header of 40 bytes; JPEG of four colours; TGA files without the footer of version 2, with palettes
-//! or with 16 bits; Radiance files with runs of the old kind or without the line of their format; EXR files of one layer with alpha. On EXR files
-//! whose data window begins below 0 it ends. It mirrors what TGA files hold from right to left, and takes other colours from palettes in BMP, which it has for grey, and from `P6` of 16 bits.
+//! or with 16 bits; Radiance files with runs of the old kind or without the line of their format; EXR files of one layer with alpha.
+//! On EXR files whose data window begins below 0 it ends. It mirrors what TGA files hold from right to left, and takes other colours from
+//! palettes in BMP, which it has for grey, and from `P6` of 16 bits.
 
 use super::decoded::{COLOURS, decode, decoder, extension, with_picture_first};
-use super::{pfm, radiance};
+use super::{jpeg, pfm, radiance};
 use crate::description::{PictureAnew, PictureRead};
 use crate::film::exr::{self, ChannelData, ColourEncoding, Compression, ExrImage, ExrPart, Layout};
 use crate::scene::bands::{Bands, Quantity};
@@ -69,7 +70,7 @@ fn is_plain(bytes: &[u8]) -> bool {
         [b'B', b'M', ..] => {
             number(14, 4) == Some(40) && matches!(number(28, 2), Some(24 | 32)) && number(30, 4) == Some(0)
         }
-        [0xff, 0xd8, ..] => matches!(jpeg_components(bytes), Some(1 | 3)),
+        [0xff, 0xd8, ..] => matches!(jpeg::components(bytes), Some(1 | 3)),
         _ if radiance::is(bytes) => radiance::is_plain(bytes),
         _ if image::guess_format(bytes).is_ok() || pfm::is(bytes) => true,
         // TGA has nothing to tell it by at its beginning.
@@ -77,22 +78,6 @@ fn is_plain(bytes: &[u8]) -> bool {
             let footer = bytes.len().checked_sub(18).is_some_and(|at| bytes[at..].starts_with(b"TRUEVISION-XFILE."));
             // Fifth of the bits that describe pixels: from right to left.
             footer && matches!(bytes[2], 2 | 3 | 10 | 11) && matches!(bytes[16], 8 | 24 | 32) && bytes[17] >> 4 & 1 == 0
-        }
-    }
-}
-
-/// How many colours the frame of a JPEG has (ITU T.81, B.2.2).
-fn jpeg_components(bytes: &[u8]) -> Option<u8> {
-    let mut at = 2;
-    loop {
-        let &[0xff, marker, high, low] = bytes.get(at..)?.first_chunk()? else { return None };
-        match marker {
-            // Fill bytes; markers without a segment.
-            0xff => at += 1,
-            0x01 | 0xd0..=0xd7 => at += 2,
-            // Frames, and not Huffman tables, arithmetic conditioning or what is kept for extensions.
-            0xc0..=0xcf if !matches!(marker, 0xc4 | 0xc8 | 0xcc) => return bytes.get(at + 9).copied(),
-            _ => at += 2 + usize::from(u16::from_be_bytes([high, low])),
         }
     }
 }
@@ -227,9 +212,9 @@ mod tests {
             let start = [0xff, 0xd8, 0xff, 0xe0, 0, 4, 7, 7, 0xff, 0xc4, 0, 3, 9, 0xff];
             let frame = [0xff, 0xc2, 0, 17, 8, 0, 1, 0, 1, colours, 1, 0x11, 0];
             let bytes = [&start[..], &frame].concat();
-            assert_eq!(jpeg_components(&bytes), Some(colours));
+            assert_eq!(jpeg::components(&bytes), Some(colours));
             assert_eq!(is_plain(&bytes), colours != 4);
-            assert_eq!(jpeg_components(&bytes[..20]), None);
+            assert_eq!(jpeg::components(&bytes[..20]), None);
         }
     }
 
@@ -311,7 +296,8 @@ mod tests {
         assert!(pixels.iter().flatten().all(|x| (x - 0.5).abs() < 1e-3), "{pixels:?}");
     }
 
-    /// Mitsuba 3.9.1 knows no format of the first five, reads the low bytes of the sixth for high ones, mirrors the seventh and knows no runs of the eighth.
+    /// Of what stands below, Mitsuba 3.9.1 knows no format of the PNM and of two TGA files and the BMP, reads the low bytes of the `P6` for
+    /// high ones, mirrors the third TGA and knows no runs of the Radiance file.
     #[test]
     fn what_mitsuba_reads_otherwise_of_other_pictures_is_written_anew() {
         let tga = |kind: u8, bits: u8, from: u8, footer: &[u8]| {

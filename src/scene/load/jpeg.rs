@@ -15,52 +15,79 @@ struct Frame {
 /// and G.1.2), and there are a quarter as many blocks as the picture has at least, however coarse its components are. Or it is of a kind
 /// that the decoder does not know, or reads otherwise than its writer meant.
 pub(super) fn fault(bytes: &[u8]) -> Option<&'static str> {
-    const END: u8 = 0xd9;
     const SCAN: u8 = 0xda;
     const CUT_OFF: &str = "expected a JPEG picture to its end, found one cut off: it is damaged";
-    let mut at = 2;
     let mut scan = None;
     let mut frame = None;
-    let word = |at: usize| Some(usize::from(u16::from_be_bytes([*bytes.get(at)?, *bytes.get(at + 1)?])));
-    while let Some(found) = bytes.get(at..).and_then(|rest| rest.windows(2).position(|m| m[0] == 0xff && m[1] != 0xff))
-    {
-        let marker = bytes[at + found + 1];
-        at += found + 2;
+    for (marker, at) in segments(bytes) {
         match marker {
             END => {
                 let blocks = frame.map_or(0, |frame: Frame| frame.blocks);
                 let whole = scan.is_some_and(|start| 8 * (at - 2).saturating_sub(start) >= blocks.div_ceil(4));
                 return (!whole).then_some(CUT_OFF);
             }
-            // A byte 0xff of the scan itself, the beginnings of its intervals, and markers that stand alone.
-            0x00 | 0x01 | 0xd0..=0xd8 => {}
-            _ => {
-                // Between the frames of all kinds are tables.
-                if let (0xc0..=0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf, Some(height), Some(width)) =
-                    (marker, word(at + 3), word(at + 5))
-                {
-                    let components = bytes.get(at + 8..).unwrap_or_default().as_chunks::<3>().0.iter();
-                    let across = components.take(bytes.get(at + 7).map_or(0, |count| usize::from(*count)));
-                    frame = Some(Frame {
-                        kind: marker - 0xc0,
-                        blocks: width.div_ceil(8) * height.div_ceil(8),
-                        across: across.map(|component| component[1] >> 4).collect(),
-                    });
-                }
-                if let (SCAN, None, Some(frame)) = (marker, scan, &frame)
+            SCAN => {
+                if let (None, Some(frame)) = (scan, &frame)
                     && let Some(fault) = fault_of(frame, bytes.get(at + 2).copied())
                 {
                     return Some(fault);
                 }
-                let Some(length) = word(at) else { return Some(CUT_OFF) };
-                at += length;
-                if marker == SCAN {
-                    scan.get_or_insert(at);
-                }
+                scan = scan.or_else(|| Some(at + word(bytes, at)?));
             }
+            _ => frame = Frame::of(bytes, marker, at).or(frame),
         }
     }
     Some(CUT_OFF)
+}
+
+/// How many colours the frame of a JPEG has.
+pub(super) fn components(bytes: &[u8]) -> Option<u8> {
+    let (_, at) = segments(bytes).find(|(marker, _)| is_frame(*marker))?;
+    bytes.get(at + 7).copied()
+}
+
+/// The marker of the end.
+const END: u8 = 0xd9;
+
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    Some(usize::from(u16::from_be_bytes([*bytes.get(at)?, *bytes.get(at + 1)?])))
+}
+
+/// The markers of a file that have a segment, and that of its end, each with where its segment begins: by its length.
+fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
+    let mut at = 2;
+    std::iter::from_fn(move || {
+        loop {
+            at += bytes.get(at..)?.windows(2).position(|m| m[0] == 0xff && m[1] != 0xff)? + 2;
+            let (marker, start) = (bytes[at - 1], at);
+            match marker {
+                // A byte 0xff of the scan itself, the beginnings of its intervals, and markers that stand alone.
+                0x00 | 0x01 | 0xd0..=0xd8 => continue,
+                END => at = bytes.len(),
+                _ => at += word(bytes, at)?,
+            }
+            return Some((marker, start));
+        }
+    })
+}
+
+/// Whether a marker begins a frame; between those of all kinds are tables.
+fn is_frame(marker: u8) -> bool {
+    matches!(marker, 0xc0..=0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf)
+}
+
+impl Frame {
+    /// The one that begins at `at` behind `marker`, if it is one.
+    fn of(bytes: &[u8], marker: u8, at: usize) -> Option<Frame> {
+        let [height, width] = [word(bytes, at + 3)?, word(bytes, at + 5)?];
+        let components = bytes.get(at + 8..).unwrap_or_default().as_chunks::<3>().0.iter();
+        let across = components.take(bytes.get(at + 7).map_or(0, |count| usize::from(*count)));
+        is_frame(marker).then(|| Frame {
+            kind: marker - 0xc0,
+            blocks: width.div_ceil(8) * height.div_ceil(8),
+            across: across.map(|component| component[1] >> 4).collect(),
+        })
+    }
 }
 
 /// What the decoder does not know, of a frame whose first scan has so many components.
