@@ -20,7 +20,8 @@
 //! Costs are counted in rays, not in seconds.
 //!
 //! **Where it pays.** Where nobody asks for it, samples are shared out in renders that an error or a time ends, if that is expected to
-//! save a twentieth of the time: each half's variance tells what the shares are worth that the other gave it (`outlook.rs`).
+//! save a twentieth of the time (`outlook.rs`). What the shares that one half gives the other are worth is told by the pilot, for each
+//! half by itself: what a half has found must not decide that either, and one may go on evenly while the other does not.
 
 use super::forecast::usual_slope;
 use super::frame::FrameJob;
@@ -192,7 +193,9 @@ pub struct Allocation {
     first: u32,
     /// Share of each half of each cell: its number of samples over the mean is 2 to this over [`STEPS`].
     shares: Vec<[i16; HALVES]>,
-    /// What becomes of the picture: even where all pixels go on alike.
+    /// Halves whose pixels all go on alike.
+    even: [bool; HALVES],
+    /// What becomes of the picture: even where all of it goes on so.
     outlook: Outlook,
 }
 
@@ -202,7 +205,8 @@ impl Allocation {
     #[must_use]
     pub fn from(window: Window, first: u32, shares: Vec<[i16; HALVES]>, outlook: Outlook) -> Option<Allocation> {
         let grid = Grid::of(window);
-        (shares.len() == grid.cells()).then_some(Allocation { grid, first, shares, outlook })
+        let even = [0, 1].map(|half| shares.iter().all(|shares: &[i16; HALVES]| shares[half] == 0));
+        (shares.len() == grid.cells()).then_some(Allocation { grid, first, shares, even, outlook })
     }
 
     /// What becomes of the picture.
@@ -221,10 +225,11 @@ impl Allocation {
     /// replicate.
     #[must_use]
     pub fn turns(&self, pixel: [i32; 2], replicate: u32, samples: &Range<u32>) -> Range<u32> {
-        let share = self.shares[self.grid.index(pixel)][replicate as usize * HALVES / REPLICATES];
-        let of = |mean: u32| match mean.checked_sub(self.first) {
-            None | Some(0) => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
-            Some(_) => count(self.first, share, mean) / REPLICATES as u32,
+        let half = replicate as usize * HALVES / REPLICATES;
+        let share = self.shares[self.grid.index(pixel)][half];
+        let of = |mean: u32| match mean <= self.first || self.even[half] {
+            true => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
+            false => count(self.first, share, mean) / REPLICATES as u32,
         };
         of(samples.start)..of(samples.end)
     }
@@ -249,9 +254,16 @@ pub struct Scale {
     shares: f64,
     /// Of a sample of each cell of the picture, over that of all.
     costs: Vec<f64>,
+    /// The variance of each cell that the pilot has looked into.
+    variances: Vec<Option<f64>>,
 }
 
-/// Relative variance of the mean of one replicate in some pixels, as their half `half` shows it.
+/// Relative variance of the mean of one replicate in some pixels, as both of their halves show it.
+fn variance_of_both(pixels: &[[[f64; 3]; REPLICATES]], floor: f64) -> f64 {
+    0.5 * (variance(pixels, 0, floor) + variance(pixels, 1, floor))
+}
+
+/// The same as their half `half` shows it.
 fn variance(pixels: &[[[f64; 3]; REPLICATES]], half: usize, floor: f64) -> f64 {
     let of = |means: &[[f64; 3]; REPLICATES]| -> f64 {
         let (a, b) = (means[2 * half], means[2 * half + 1]);
@@ -357,16 +369,21 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
         let around = near(row, grid.rows).flat_map(|r| near(column, grid.columns).map(move |c| r * grid.columns + c));
         let pixels: Vec<_> = around.flat_map(|cell| &tried[cell].pixels).copied().collect();
-        let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
-        wish(variance, tried[cell].cost / cost)
+        wish(variance_of_both(&pixels, floor), tried[cell].cost / cost)
     };
     let has_some = |cell: &usize| !tried[*cell].pixels.is_empty();
     let wishes: Vec<f64> = (0..grid.cells()).filter(has_some).map(wish).collect();
+    let own = |cell: usize| has_some(&cell).then(|| variance_of_both(&tried[cell].pixels, floor));
+    let mut variances: Vec<Option<f64>> = (0..grid.cells()).map(own).collect();
     let wishes = match job.plan.splatting || job.plan.reuse || grid.cells() <= FEW {
         false => wishes,
         true => {
             // How much more or less they wish for is told by some, where pixels by themselves tell anything.
-            let whole = wishes_of_whole_cells(job, first, seed, (floor, &costs), pause)?;
+            let whole = variances_of_whole_cells(job, first, seed, floor, pause)?;
+            variances.fill(None);
+            whole.iter().for_each(|&(cell, variance)| variances[cell] = Some(variance));
+            let whole: Vec<(usize, f64)> =
+                whole.into_iter().map(|(cell, own)| (cell, self::wish(own, costs[cell]))).collect();
             let sums = whole.iter().filter(|(cell, _)| has_some(cell));
             let (told, alone) = sums.fold((0.0, 0.0), |(told, alone), &(cell, own)| (told + own, alone + wish(cell)));
             match told > 0.0 && alone > 0.0 && grid.cells() > FEW {
@@ -376,16 +393,16 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         }
     };
     let least = if job.stop.is_open() { LEAST } else { LEAST.max(f64::from(first) / f64::from(job.samples)) };
-    Some(Scale { floor, shares: scale(&wishes, least), costs })
+    Some(Scale { floor, shares: scale(&wishes, least), costs, variances })
 }
 
-/// Some cells, and their wishes, whose pixels all have the `first` samples of the pilot, as [`decide`] will tell them; none if the render is
-/// to pause.
-fn wishes_of_whole_cells(
+/// Some cells, and their variances, whose pixels all have the `first` samples of the pilot, as [`decide`] will tell them; none if the
+/// render is to pause.
+fn variances_of_whole_cells(
     job: &FrameJob,
     first: u32,
     seed: u64,
-    (floor, costs): (f64, &[f64]),
+    floor: f64,
     pause: &dyn Breaks,
 ) -> Option<Vec<(usize, f64)>> {
     let job = FrameJob { seed, ..*job };
@@ -406,8 +423,7 @@ fn wishes_of_whole_cells(
         let mut film = Film::new(job.scene.camera.resolution, window).ok()?.with_layers(layout);
         film.merge_tile(&tile);
         let pixels = means(&film, window, &rgb_from_xyz);
-        let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
-        Some((cell, wish(variance, costs[cell])))
+        Some((cell, variance_of_both(&pixels, floor)))
     };
     cells.into_par_iter().map(of_cell).collect()
 }
@@ -443,33 +459,37 @@ pub fn decide(job: &FrameJob, adaptive: Adaptive, film: &Film, scale: &Scale) ->
         (pixels.len() as f64, [0, 1].map(|half| (variances[half], wish(half))))
     };
     let cells: Vec<_> = (0..grid.cells()).into_par_iter().map(of_cell).collect();
-    let in_common = [0, 1].map(|half: usize| match job.stop.is_open() {
-        true => self::scale(&cells.iter().map(|(_, halves)| halves[half].1).collect::<Vec<f64>>(), LEAST),
-        false => scale.shares,
-    });
-    let even = || {
-        let shares = vec![[0; HALVES]; grid.cells()];
-        Allocation { grid, first, shares, outlook: Outlook::default() }
+    let end = f64::from(first.saturating_mul(HORIZON));
+    // Those that one half gives the other, none where it has met no noise; only their worth may be looked at here.
+    let shares_of = |half: usize| -> Vec<i16> {
+        let in_common = match job.stop.is_open() {
+            true => self::scale(&cells.iter().map(|(_, halves)| halves[half].1).collect::<Vec<f64>>(), LEAST),
+            false => scale.shares,
+        };
+        let share = |wish: f64| (libm::log2((in_common * wish).clamp(LEAST, MOST)) * STEPS).round() as i16;
+        let shares: Vec<i16> = cells.iter().map(|(_, halves)| share(halves[half].1)).collect();
+        let kinds = cells.iter().zip(&shares).enumerate().filter_map(|(cell, ((count, _), share))| {
+            let variance = count * scale.variances[offset + cell]?;
+            Some(Kind { share: *share, variance, cost: count * scale.costs[offset + cell] })
+        });
+        let pays = || Outlook::new(first, kinds.collect()).time(end, usual_slope(end, true)) < WORTH_IT;
+        match in_common > 0.0 && (adaptive.always || pays()) {
+            true => shares,
+            false => vec![0; cells.len()],
+        }
     };
-    if in_common.contains(&0.0) {
-        return even();
-    }
-    let share = |half: usize, wish: f64| -> i16 {
-        (libm::log2((in_common[half] * wish).clamp(LEAST, MOST)) * STEPS).round() as i16
-    };
-    let shares: Vec<[i16; HALVES]> =
-        cells.iter().map(|(_, halves)| [0, 1].map(|half| share(half, halves[half].1))).collect();
+    let [a, b] = [0, 1].map(shares_of);
+    let shares: Vec<[i16; HALVES]> = a.into_iter().zip(b).map(|(a, b)| [a, b]).collect();
     let kinds = cells.iter().zip(&shares).enumerate().flat_map(|(cell, ((count, halves), shares))| {
         let cost = count * scale.costs[offset + cell];
         [0, 1].map(|half| Kind { share: shares[half], variance: count * halves[half].0, cost })
     });
-    let outlook = Outlook::new(first, kinds.collect());
-    let end = f64::from(first.saturating_mul(HORIZON));
-    let pays = outlook.time(end, usual_slope(end, true)) < WORTH_IT;
-    match adaptive.always || pays {
-        true => Allocation { grid, first, shares, outlook },
-        false => even(),
-    }
+    let outlook = match shares.iter().all(|shares| *shares == [0; HALVES]) {
+        true => Outlook::default(),
+        false => Outlook::new(first, kinds.collect()),
+    };
+    let even = [0, 1].map(|half| shares.iter().all(|shares| shares[half] == 0));
+    Allocation { grid, first, shares, even, outlook }
 }
 
 #[cfg(test)]
