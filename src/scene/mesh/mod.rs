@@ -59,7 +59,7 @@ pub enum Winding {
     /// outside under a transform that mirrors.
     Object,
     /// That from which it is counterclockwise in the world, so that a mirror turns the mesh inside out; but
-    /// where the file's normals are used, the side that they are on, weighted by area.
+    /// where there are normals at the vertices, the file's or their own means, the side that they are on, triangle by triangle.
     World,
 }
 
@@ -178,7 +178,9 @@ pub struct Mesh {
     /// and no sampler chooses them.
     pub flat_triangles: usize,
     /// True where the second and third corner of each triangle stand the other way round than in the file.
-    pub swapped: bool,
+    swapped: bool,
+    /// The triangles of which the contrary is true, in order.
+    contrary: Vec<u32>,
 }
 
 impl Mesh {
@@ -210,29 +212,59 @@ impl Mesh {
 
         let linear = world_from_object.matrix3;
         let mirrored = linear.determinant() < 0.0;
-        let with_normals = matches!(mode, NormalMode::File | NormalMode::Vertex) && !source.normals.is_empty();
-        let swapped = match winding {
-            Winding::Object => mirrored,
-            // In object space both kinds of normal are as the file has them; a mirror leaves its normals on
-            // their side.
-            Winding::World if with_normals => mirrored != source.is_wound_against_its_normals(),
-            Winding::World => false,
-        };
-        let triangles: Vec<[u32; 3]> =
-            source.triangles.iter().map(|&[a, b, c]| if swapped { [a, c, b] } else { [a, b, c] }).collect();
         let uvs = source.uvs.iter().map(|uv| uv.as_vec2().to_array()).collect();
-        let mut mesh = Mesh { origin, positions, normals: Vec::new(), uvs, triangles, flat_triangles: 0, swapped };
+        let mut mesh = Mesh {
+            origin,
+            positions,
+            normals: Vec::new(),
+            uvs,
+            triangles: source.triangles.clone(),
+            flat_triangles: 0,
+            swapped: winding == Winding::Object && mirrored,
+            contrary: Vec::new(),
+        };
+        if mesh.swapped {
+            mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
         mesh.flat_triangles = (0..mesh.triangles.len()).filter(|&i| mesh.area(i as u32) == 0.0).count();
         mesh.normals = match mode {
             NormalMode::Face => Vec::new(),
-            NormalMode::File | NormalMode::Vertex if with_normals => {
+            NormalMode::File | NormalMode::Vertex if !source.normals.is_empty() => {
+                // A mirror leaves normals on their side.
                 let to_world = normal_transform(&linear);
                 source.normals.iter().map(|&n| unit_or_zero(to_world * n).as_vec3().to_array()).collect()
             }
             NormalMode::File | NormalMode::Smooth => smooth_normals(&mesh, &places(&mesh)),
             NormalMode::Vertex => smooth_normals(&mesh, &(0..mesh.positions.len()).collect::<Vec<usize>>()),
         };
+        if winding == Winding::World && matches!(mode, NormalMode::File | NormalMode::Vertex) {
+            mesh.turn_to_normals();
+        }
         Ok(mesh)
+    }
+
+    /// Winds the triangles, still as in the file, so that their outside is where the normals at their corners are; those of which that
+    /// cannot be said as most of the area.
+    fn turn_to_normals(&mut self) {
+        let agreement = |i: usize| {
+            let n = self.triangles[i].map(|v| DVec3::from(self.normals[v as usize].map(f64::from)));
+            self.area_vector(i as u32).dot(n[0] + n[1] + n[2])
+        };
+        let agreements: Vec<f64> = (0..self.triangles.len()).map(agreement).collect();
+        self.swapped = agreements.iter().sum::<f64>() < 0.0;
+        let sign = if self.swapped { -1.0 } else { 1.0 };
+        let contrary = agreements.iter().enumerate().filter(|(_, agreement)| sign * **agreement < 0.0);
+        self.contrary = contrary.map(|(i, _)| i as u32).collect();
+        for i in 0..self.triangles.len() {
+            if self.is_swapped(i as u32) {
+                self.triangles[i].swap(1, 2);
+            }
+        }
+    }
+
+    /// Whether the second and third corner of triangle `i` stand the other way round than in the file.
+    fn is_swapped(&self, i: u32) -> bool {
+        self.swapped != self.contrary.binary_search(&i).is_ok()
     }
 
     /// Whether it may enclose a volume, with edges that do not meet or not: the areas of what is closed add up to nothing, as vectors.
@@ -254,7 +286,7 @@ impl Mesh {
     /// second and third corner.
     #[must_use]
     pub fn texture_corners(&self, i: u32) -> [DVec2; 3] {
-        match (self.uvs.is_empty(), self.swapped) {
+        match (self.uvs.is_empty(), self.is_swapped(i)) {
             (false, _) => self.triangles[i as usize].map(|v| DVec2::from(self.uvs[v as usize].map(f64::from))),
             (true, false) => [DVec2::ZERO, DVec2::X, DVec2::Y],
             (true, true) => [DVec2::ZERO, DVec2::Y, DVec2::X],
@@ -355,7 +387,7 @@ impl Mesh {
 
         let (uv, tangent) = if self.uvs.is_empty() {
             // u and v are the weights of the file's second and third corner.
-            if self.swapped { (DVec2::new(b2, b1), e2) } else { (DVec2::new(b1, b2), e1) }
+            if self.is_swapped(i) { (DVec2::new(b2, b1), e2) } else { (DVec2::new(b1, b2), e1) }
         } else {
             let [t0, t1, t2] = self.texture_corners(i);
             let (d1, d2) = (t1 - t0, t2 - t0);
@@ -392,7 +424,10 @@ impl Mesh {
     /// Memory of the lists.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of::<Mesh>() + 12 * (self.positions.len() + self.normals.len() + self.triangles.len()) + 8 * self.uvs.len()
+        size_of::<Mesh>()
+            + 12 * (self.positions.len() + self.normals.len() + self.triangles.len())
+            + 8 * self.uvs.len()
+            + 4 * self.contrary.len()
     }
 }
 

@@ -424,7 +424,7 @@ fn winding_in_the_world_follows_the_right_hand_or_the_normals() {
         let place = DAffine3::from_scale(DVec3::new(if mirrored { -1.0 } else { 1.0 }, 1.0, 1.0));
         let mesh = Mesh::new(&source, &place, NormalMode::Vertex, Winding::World).unwrap();
         // u and v stay with the file's corners: here (0.2, 0.3) is x = ±0.2, y = 0.3.
-        let (b1, b2) = if mesh.swapped { (0.3, 0.2) } else { (0.2, 0.3) };
+        let (b1, b2) = if mesh.is_swapped(0) { (0.3, 0.2) } else { (0.2, 0.3) };
         let s = mesh.surface(0, b1, b2);
         assert_eq!((s.normal.z, s.shading_normal.z), (outside, outside), "{normal:?} {mirrored}");
         assert!((s.uv - DVec2::new(0.2, 0.3)).length() < 1e-15 && (s.point.y - 0.3).abs() < 1e-15, "{s:?}");
@@ -432,6 +432,45 @@ fn winding_in_the_world_follows_the_right_hand_or_the_normals() {
         let faced = Mesh::new(&source, &place, NormalMode::Face, Winding::World).unwrap();
         assert_eq!(faced.surface(0, 0.2, 0.2).normal.z, if mirrored { -1.0 } else { 1.0 });
     }
+}
+
+/// Three triangles wound either way, with normals that point up all over: each has its outside above, and u and v by the file's corners.
+#[test]
+fn each_triangle_has_its_outside_where_its_normals_are() {
+    let corners =
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (4.0, 4.0), (8.0, 4.0), (4.0, 8.0), (2.0, 0.0), (3.0, 0.0), (2.0, 1.0)];
+    let source = MeshSource {
+        positions: corners.map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec(),
+        normals: vec![DVec3::Z; 9],
+        triangles: vec![[0, 1, 2], [3, 5, 4], [6, 8, 7]],
+        ..MeshSource::default()
+    };
+    let sorted = MeshSource { triangles: vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]], ..source.clone() };
+    for mirror in [1.0, -1.0] {
+        let place = DAffine3::from_scale(DVec3::new(mirror, 1.0, 1.0));
+        let [mixed, sorted] =
+            [&source, &sorted].map(|source| Mesh::new(source, &place, NormalMode::Vertex, Winding::World).unwrap());
+        assert_eq!(mixed.triangles, sorted.triangles);
+        for i in 0..3 {
+            let (a, b) = (mixed.surface(i, 0.2, 0.3), sorted.surface(i, 0.2, 0.3));
+            assert_eq!((a.point, a.normal, a.shading_normal), (b.point, DVec3::Z, DVec3::Z));
+            // The second and third corner of the file are those of the sorted one, or the other way round.
+            assert_eq!(a.uv, if i == 0 { b.uv } else { DVec2::new(b.uv.y, b.uv.x) });
+        }
+    }
+    // Of a fan of four, one of which is wound the other way, the means at the vertices tell; its tip has none of its own.
+    let fan = MeshSource {
+        positions: [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
+            .map(|(x, y)| DVec3::new(x, y, 0.0))
+            .to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3], [0, 4, 3], [0, 4, 1]],
+        ..MeshSource::default()
+    };
+    let fan = Mesh::new(&fan, &DAffine3::IDENTITY, NormalMode::Vertex, Winding::World).unwrap();
+    assert_eq!(fan.triangles[2], [0, 3, 4]);
+    assert_eq!([0, 1, 2, 3].map(|i| fan.surface(i, 0.2, 0.2).normal.z), [1.0; 4]);
+    let faced = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face, Winding::World).unwrap();
+    assert_eq!([0, 1, 2].map(|i| faced.surface(i, 0.2, 0.2).normal.z), [1.0, -1.0, -1.0]);
 }
 
 /// Areas 0, 2 and 6: the second is chosen for u < ¼ and the third above; the first never.
