@@ -105,7 +105,12 @@ impl RoundCone {
                 return None;
             }
             let root = discriminant.max(0.0).sqrt();
-            let tau = if b > 0.0 { -(b + root) / quadratic } else { c / (root - b) };
+            // A line that passes the wall is nearest to it there: c / −b is as far off as b is small.
+            let tau = match discriminant > 0.0 {
+                true if b > 0.0 => -(b + root) / quadratic,
+                true => c / (root - b),
+                false => -b / quadratic,
+            };
             let next = v + (wa - k * r + tau * along) / spread;
             if next.is_nan() {
                 return None;

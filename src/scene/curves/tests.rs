@@ -52,6 +52,12 @@ fn a_round_cone_is_entered_where_its_first_ball_is() {
             ray.direction = (cone.axis + random.direction() * random.log_uniform(-12.0, -1.0)).normalize();
             ray.origin = target - ray.direction * 3.0;
         }
+        if i % 7 == 1 {
+            // At a right angle to it, or nearly.
+            let across = cone.axis.cross(random.direction()).normalize();
+            ray.direction = (across + random.direction() * random.log_uniform(-18.0, -5.0)).normalize();
+            ray.origin = target - ray.direction * 3.0;
+        }
         let enter = |v: f64| {
             let (w, r) = (cone.center(v) - ray.origin, cone.radius(v));
             let t = w.dot(ray.direction);
