@@ -155,7 +155,7 @@
 //! volumes:
 //!   haze: {constant: {value: 0.5, transform: [{scale: 2}]}}
 //!                                   # transform as of shapes, from the unit cube; default none
-//!   # plume: {grid: {file: plume.vol, filter: trilinear, wrap: clamp, raw: false, file_box: false}}
+//!   # plume: {grid: {file: plume.vol, filter: trilinear, wrap: clamp, raw: false, file_box: false, above_one: false}}
 //!                                   # and transform; all but file default; trilinear, nearest; wrap as of textures, by which it
 //!                                   # goes on beyond its cube as far as the box along the world's axes around that
 //! materials:                        # ~ marks defaults
@@ -462,7 +462,7 @@
 //! output.png.white_balance: [1000, 40000]               # K
 //! materials.a.conductor.eta: [0, 1.0e6]                 # and k
 //! materials.a.conductor.roughness: [0, 10]
-//! materials.a.conductor.film.thickness_nm: [0, 1.0e9]
+//! materials.a.conductor.film.thickness_nm: [0, 1.0e8]
 //! materials.a.principled.sampling.specular: [1.0e-6, 1.0e6]      # of others 0, too
 //! materials.a.hair.tilt_deg: [-10, 10]
 //! lights[0].sky.sun.elevation_deg: [-90, 90]             # and latitude_deg

@@ -34,6 +34,10 @@ pub struct GridVolume {
     /// Whether three channels are data, not colours; default false.
     #[serde(default)]
     pub raw: bool,
+    /// Whether spectra of colours may exceed 1, as Mitsuba's do where the colours are strong, where the grid is an albedo or a
+    /// reflectance: surfaces and media make light then. Default false.
+    #[serde(default)]
+    pub above_one: bool,
     /// Whether the grid fills the box that its file names, before the transform; default false: the unit cube from
     /// the origin to (1, 1, 1).
     #[serde(default)]

@@ -547,6 +547,8 @@ mod tests {
             values: Voxels::Grey([0.25, 0.75].into()),
             between: Between::Nearest,
             wrap: Wrap::Clamp,
+            above_one: false,
+            clamped: false,
             local_from_world: DAffine3::from_scale(DVec3::splat(0.5)),
             brightest: std::sync::OnceLock::new(),
         }));

@@ -444,6 +444,8 @@ mod tests {
             local_from_world: DAffine3::IDENTITY,
             between: Between::Trilinear,
             wrap: Wrap::Clamp,
+            above_one: false,
+            clamped: false,
             brightest: OnceLock::new(),
         }))
     }
@@ -532,6 +534,8 @@ mod tests {
             local_from_world: DAffine3::IDENTITY,
             between: Between::Trilinear,
             wrap: Wrap::Clamp,
+            above_one: false,
+            clamped: false,
             brightest: OnceLock::new(),
         }));
         let medium = along(Varying::new(volume.clone(), 2.0, grey(1.0)));

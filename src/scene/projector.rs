@@ -231,8 +231,16 @@ mod tests {
         let (between, wrap) = (Between::Nearest, Wrap::Clamp);
         let local_from_world = DAffine3::from_scale(DVec3::splat(0.25));
         let values = Voxels::Grey([1.0, 5.0].into());
-        let grid =
-            GridVolume { size: [2, 1, 1], values, local_from_world, between, wrap, brightest: Default::default() };
+        let grid = GridVolume {
+            size: [2, 1, 1],
+            values,
+            local_from_world,
+            between,
+            wrap,
+            above_one: false,
+            clamped: false,
+            brightest: Default::default(),
+        };
         let place = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(9.0, 2.0, 3.0), DVec3::Y).unwrap();
         let slide = Texture::Volume(Volume::Grid(Arc::new(grid)));
         let projector = Projector::new(place, DVec2::new(2.0, 1.0), slide, 3.0);

@@ -362,6 +362,18 @@ impl Texture {
         }
     }
 
+    /// The same as reflectances: what it cuts out of a volume is shares of light.
+    #[must_use]
+    pub fn of_shares(self) -> Texture {
+        match self {
+            Texture::Volume(volume) => Texture::Volume(volume.of_shares()),
+            Texture::Checkerboard { a, b, uv } => {
+                Texture::Checkerboard { a: Box::new(a.of_shares()), b: Box::new(b.of_shares()), uv }
+            }
+            other => other,
+        }
+    }
+
     /// True for anything but one spectrum.
     #[must_use]
     pub fn varies(&self) -> bool {

@@ -56,6 +56,10 @@ pub struct GridVolume {
     pub between: Between,
     /// Beyond the cube.
     pub wrap: Wrap,
+    /// Whether spectra of strong colours may exceed 1 where they are shares of light.
+    pub above_one: bool,
+    /// Whether they are, and may not.
+    pub clamped: bool,
     /// The voxel with the most light, once that is asked for.
     pub brightest: OnceLock<Option<usize>>,
 }
@@ -217,7 +221,7 @@ impl GridVolume {
             let [a, b, c, _] = values[i];
             upsample::eval_sigmoid([a, b, c], nm)
         };
-        match self.between {
+        let value = match self.between {
             Between::Nearest => {
                 let i = self.nearest(place);
                 sigmoid(i) * values[i][3]
@@ -226,7 +230,8 @@ impl GridVolume {
                 let n = self.neighbours(place);
                 self.blend(&n, sigmoid) * self.blend(&n, |i| values[i][3])
             }
-        }
+        };
+        if self.clamped { value.min(Lanes::ONE) } else { value }
     }
 
     /// What no wavelength exceeds: of voxel `i`, the largest value and the factor on it.
@@ -281,6 +286,17 @@ impl GridVolume {
 }
 
 impl Volume {
+    /// The same as shares of light.
+    #[must_use]
+    pub fn of_shares(self) -> Volume {
+        match self {
+            Volume::Grid(grid) if matches!(grid.values, Voxels::Coloured(_)) && !grid.above_one => {
+                Volume::Grid(Arc::new(GridVolume { clamped: true, ..GridVolume::clone(&grid) }))
+            }
+            other => other,
+        }
+    }
+
     /// The spectrum at `point`.
     #[must_use]
     #[inline]
@@ -377,7 +393,8 @@ mod tests {
 
     pub(super) fn grid(size: [usize; 3], values: Voxels) -> GridVolume {
         let (local_from_world, between, wrap) = (DAffine3::IDENTITY, Between::Trilinear, Wrap::Clamp);
-        GridVolume { size, values, local_from_world, between, wrap, brightest: OnceLock::new() }
+        let (above_one, clamped, brightest) = (false, false, OnceLock::new());
+        GridVolume { size, values, local_from_world, between, wrap, above_one, clamped, brightest }
     }
 
     /// A deterministic spread of numbers in [0, 1).

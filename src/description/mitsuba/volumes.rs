@@ -97,6 +97,7 @@ fn grid(bag: &Bag<'_>) -> Result<Node, Fault> {
             fields.add(ours, boolean(bag.place(theirs), value));
         }
     }
+    fields.add("above_one", boolean(bag.object.place, true));
     // How it is kept in memory, and an upper bound: ours are found from the values.
     bag.boolean("accel")?;
     bag.float("max_value")?;

@@ -89,7 +89,7 @@ impl Compiler<'_> {
     }
 
     fn albedo(&mut self, at: &str, s: &written::SpectrumOrVolume) -> Volume {
-        let albedo = self.spectrum_or_volume(at, s);
+        let albedo = self.spectrum_or_volume(at, s).of_shares();
         match (s, &albedo) {
             (written::SpectrumOrVolume::Spectrum(written), Volume::Constant { value, .. }) => {
                 self.check_file_of_shares(at, written, value);
@@ -258,6 +258,8 @@ fn place_grid(written: &written::GridVolume, grid: Unplaced, world_from_local: D
             written::VolumeFilter::Trilinear => Between::Trilinear,
             written::VolumeFilter::Nearest => Between::Nearest,
         },
+        above_one: written.above_one,
+        clamped: false,
         wrap: match written.wrap {
             written::Wrap::Repeat => Wrap::Repeat,
             written::Wrap::Mirror => Wrap::Mirror,
@@ -276,6 +278,7 @@ mod tests {
     use crate::scene::material::Kind;
     use crate::scene::shelf::Shelf;
     use crate::scene::texture::Texture;
+    use crate::spectrum::Lanes;
 
     /// A cloud is read once for all the scenes of its way, such as the moments while a shutter is open: they share its numbers,
     /// and each has a place of its own.
@@ -303,6 +306,34 @@ mod tests {
         // The middle of the second voxel.
         let at = DVec3::new(0.75, 0.5, 0.5);
         assert_eq!([here.scalar(at), there.scalar(at + DVec3::X * 2.0)], [0.75; 2]);
+    }
+
+    /// The spectrum of a strong red, which Mitsuba upsamples with a factor: as an albedo and a reflectance no more than all light, and as it
+    /// is where that is said.
+    #[test]
+    fn colours_of_a_grid_are_shares_where_they_stand_for_some() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("red.vol"), vol([1, 1, 1], 3, &[0.9, 0.05, 0.05])).unwrap();
+        let most = |above_one: bool| -> [f32; 2] {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 volumes: {{v: {{grid: {{file: red.vol, above_one: {above_one}}}}}}}\ntextures: {{t: {{volume: v}}}}\n\
+                 media: {{m: {{homogeneous: {{extinction: 1, albedo: {{volume: v}}}}}}}}\nshapes:\n\
+                 - sphere: {{radius: 1, material: {{diffuse: {{reflectance: {{texture: t}}}}}}}}\n\
+                 - sphere: {{center: [3, 0, 0], radius: 1, inside: m, material: {{boundary: {{}}}}}}\n"
+            );
+            let scene = compiled_with(directory.path(), &text, &mut Shelf::default());
+            let Kind::Diffuse { reflectance: Texture::Volume(reflectance) } =
+                &scene.materials[scene.objects[0].material as usize].kind
+            else {
+                panic!("a volume")
+            };
+            let Filling::EvenExtinction { albedo, .. } = &scene.media[0].filling else { panic!("an albedo") };
+            [reflectance, albedo].map(|volume| volume.eval(DVec3::splat(0.5), Lanes::splat(700.0)).to_array()[0])
+        };
+        let [reflectance, albedo] = most(true);
+        assert!(reflectance == albedo && albedo > 1.7, "{reflectance} {albedo}");
+        assert_eq!(most(false), [1.0; 2]);
     }
 
     /// No path gets into what light does not cross. What it was said to hold counted as a medium and kept pixels from sharing paths.

@@ -27,7 +27,7 @@ impl<'a> Compiler<'a> {
                 let at = format!("{at}.texture");
                 let texture = self.named_texture(name);
                 self.check_reflects(&at, &texture, name);
-                texture
+                texture.of_shares()
             }
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
         }

@@ -63,7 +63,7 @@ impl<'a> Export<'a> {
             Texture::Checkerboard(board) => {
                 Export::either_shortfall(&[&board.a, &board.b], "grey squares in place of a spectrum")
             }
-            Texture::Volume(volume) => self.volume_shortfall(volume),
+            Texture::Volume(volume) => self.volume_shortfall(volume).or_else(|| self.share_shortfall(volume)),
             Texture::MeshAttribute(_) => None,
         }
     }

@@ -143,8 +143,12 @@ impl Export<'_> {
             SpectrumOrVolume::Spectrum(spectrum) => Export::coefficient_shortfall(spectrum),
             SpectrumOrVolume::Volume(name) => self.volume_shortfall(name),
         };
+        let share = |value: &SpectrumOrVolume| match value {
+            SpectrumOrVolume::Spectrum(_) => None,
+            SpectrumOrVolume::Volume(name) => self.share_shortfall(name),
+        };
         let both = |extinction: Option<&'static str>, albedo: &SpectrumOrVolume| {
-            let albedo = either(albedo).filter(|why| extinction != Some(why));
+            let albedo = either(albedo).or(share(albedo)).filter(|why| extinction != Some(why));
             joined([extinction, albedo].map(|why| why.map(str::to_owned)))
         };
         match medium {
@@ -173,5 +177,13 @@ impl Export<'_> {
             Some(Volume::Constant(constant)) => Export::coefficient_shortfall(&constant.value),
             Some(Volume::Grid(_)) | None => None,
         }
+    }
+
+    /// What Mitsuba gets in place of a volume whose numbers are shares of light.
+    pub(super) fn share_shortfall(&self, name: &str) -> Option<&'static str> {
+        let differs = |volume: &Volume| matches!(volume, Volume::Grid(grid) if !grid.above_one && !grid.raw);
+        self.scene.volumes.get(name).is_some_and(differs).then_some(
+            "the same grid: Mitsuba's spectra of its colours, if it has some and they are strong, exceed 1, and make light",
+        )
     }
 }
