@@ -292,7 +292,8 @@ impl Facets<'_> {
 
     /// The means of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
     fn mean<const N: usize>(&self, cos: f64, entry: u32, f: impl Fn(&Vec4, &Vec4) -> [f64x4; N]) -> [f64; N] {
-        let cos = cos.max(1e-3); // the limit at grazing; the table is interpolated from there
+        // The limit at grazing, as Mitsuba has it: of narrow coats that of 1e-3 is another. The table is interpolated from there.
+        let cos = cos.max(1e-6);
         let one = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
         let wo = &splat(one);
         let mut sum = [0.0; N];
@@ -429,6 +430,16 @@ mod tests {
         };
         let cosines: Vec<f64> = (0..COSINES).into_par_iter().map(|i| of(at(i, COSINES))).collect();
         cosines.iter().sum::<f64>() / f64::from(COSINES)
+    }
+
+    /// What comes through at grazing angles, by 2 million facets drawn at random that a cosine of 1e-6 sees: 0.03011 ± 0.00006 and 0.17006
+    /// ± 0.00014. The lattice of 2584 is held to a hundredth.
+    #[test]
+    fn the_first_entry_is_the_limit_at_grazing() {
+        for (alpha, expected) in [(1e-3, 0.03011), (0.01, 0.17006)] {
+            let found = CoatTable::new(1.49 / 1.000_277, &facets(alpha), DiffuseMean::Nodes).at(0.0);
+            assert!((found / expected - 1.0).abs() < 0.01, "{alpha}: {found}");
+        }
     }
 
     /// A coat of next to no roughness reflects from inside what a smooth one does; one of some what a finer integral finds. A base
