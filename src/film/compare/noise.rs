@@ -105,7 +105,10 @@ impl<'a> Pair<'a> {
             (None, errors) => Noise::Errors(errors),
         };
         let is_half = |samples| match samples {
-            Samples::Float(values) => values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v),
+            // Zeros are numbers of any kind: of nothing but these it is not known.
+            Samples::Float(values) => {
+                values.iter().any(|&v| v != 0.0) && values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v)
+            }
             Samples::Integer(_) => false,
         };
         let half = is_half(a) || is_half(b);
@@ -370,6 +373,10 @@ mod tests {
             let found = pair.variance(1).unwrap();
             assert_eq!((found.estimated, found.known), ([0.0625; 2], expected));
         }
+        // Black is no half float for being black.
+        let (black, dark) = ([0.0f32; 2], [1e-9f32; 2]);
+        let pair = Pair::new("Y".into(), [Samples::Float(&black), Samples::Float(&dark)], errors, known, 2, None);
+        assert_eq!(pair.difference(0), -f64::from(dark[0]));
     }
 
     /// Halves near 1 are 2⁻¹⁰ apart, near 65504 they are 32 apart, and subnormals 2⁻²⁴.
