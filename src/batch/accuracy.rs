@@ -78,6 +78,13 @@ pub struct Figure {
     pub error: f64,
 }
 
+impl Figure {
+    /// Whether this factor is another than 1, by a standard error that is a share of itself.
+    fn is_another_factor(&self) -> bool {
+        libm::log(self.value).abs() * self.value > figures::SIGNIFICANT * self.error
+    }
+}
+
 /// The error after some time.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Point {
@@ -254,7 +261,7 @@ pub fn sheet(
 fn small_copy(image: &description::Image, pixels: u32) -> ([u32; 2], Vec<(String, String)>) {
     let [width, height] = [image.width, image.height].map(f64::from);
     let scale = (f64::from(pixels) / (width * height)).sqrt().min(1.0);
-    let size = [width, height].map(|side| ((side * scale).round() as u32).max(8));
+    let size = [width, height].map(|side| (side * scale).round().max(side.min(8.0)) as u32);
     let mut set = vec![
         ("image.width".to_owned(), size[0].to_string()),
         ("image.height".to_owned(), size[1].to_string()),

@@ -1,6 +1,5 @@
 //! What the figures of a sheet say in words.
 
-use super::figures::SIGNIFICANT;
 use super::{Row, knobs};
 
 /// What each knob buys, in a sentence.
@@ -104,7 +103,7 @@ fn trade(chosen: &Row, rows: &[Row]) -> String {
         alike.push(row.value.clone());
         if !row.efficiency.value.is_finite() {
             speed.push(format!("{} has no noise", row.value));
-        } else if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
+        } else if row.efficiency.is_another_factor() {
             speed.push(format!("{} takes {} of the time", row.value, figures(1.0 / row.efficiency.value)));
         }
     }
@@ -199,6 +198,14 @@ mod tests {
             "1 finds 50.0 % less green (bias 30.0 %) in 0.50 of the time; 8 finds the same light; to the same noise 8 \
              takes 2.00 of the time."
         );
+    }
+
+    /// Errors of factors are relative: 0.2 and 5 known to the half of themselves are told, known to themselves not, and 1.4 to the tenth.
+    #[test]
+    fn a_factor_is_told_where_it_stands_out_of_its_relative_error() {
+        let told = [(0.2, 0.1), (0.2, 0.2), (5.0, 2.5), (5.0, 5.0), (1.4, 0.1), (1.2, 0.1)]
+            .map(|(value, error)| Figure { value, error }.is_another_factor());
+        assert_eq!(told, [true, false, true, false, true, false]);
     }
 
     /// The chosen setting is so noisy that it may have the bias that stands out of the knob, or none.

@@ -69,7 +69,8 @@ fn contents(out: &mut String, sheets: &[Sheet]) {
         // Three numbers and other builds are no settings of a scene.
         let is_setting = |row: &Row| row.knob != "transport" && row.knob != "build";
         let sooner = |row: &&Row| {
-            is_setting(row) && row.bias().is_none() && row.efficiency.value - 3.0 * row.efficiency.error > 1.0
+            let efficiency = row.efficiency;
+            is_setting(row) && row.bias().is_none() && efficiency.value > 1.0 && efficiency.is_another_factor()
         };
         let best = moved().filter(sooner).max_by(|a, b| a.efficiency.value.total_cmp(&b.efficiency.value));
         let best = best.map_or("as chosen".into(), |row| format!("{}: {:.2}", name(row), 1.0 / row.efficiency.value));
