@@ -357,15 +357,17 @@ fn columns(of: impl Fn(usize) -> [f32; 4]) -> [Lanes; 4] {
     [Lanes::new(a), Lanes::new(b), Lanes::new(c), Lanes::new(d)]
 }
 
-/// The values at `nm` among crowded knots. The same number of steps for any wavelength: a loop that
-/// ended as soon as it could would be mispredicted. By itself, so that cells need no stack for it.
+/// The values at `nm` among crowded knots, up to `most` of them behind that at which a search starts. The same number of halvings for any
+/// wavelength: a loop that ended as soon as it could would be mispredicted. By itself, so that cells need no stack for it.
 #[inline(never)]
-fn among_crowded(entries: &[[f32; 3]], start: &[u16], steps: u16, nm: Lanes) -> Lanes {
+fn among_crowded(entries: &[[f32; 3]], start: &[u16], most: u16, nm: Lanes) -> Lanes {
+    let halvings = (usize::from(most) + 1).next_power_of_two().ilog2();
     let mut values = [0.0; LANES];
     for (value, nm) in values.iter_mut().zip(nm.to_array()) {
         let mut i = usize::from(start[((nm - BAND_NM[0] as f32) as u32 as usize).min(start.len() - 1)]);
-        for _ in 0..steps {
-            i += usize::from(entries[(i + 1).min(entries.len() - 1)][0] <= nm);
+        for halving in (0..halvings).rev() {
+            let next = (i + (1 << halving)).min(entries.len() - 1);
+            i = if entries[next][0] <= nm { next } else { i };
         }
         let [knot, at_knot, slope] = entries[i];
         *value = slope.mul_add(nm - knot, at_knot);
