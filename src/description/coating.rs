@@ -61,9 +61,10 @@ impl Thickness {
     }
 }
 
-/// The thickest film, nanometres: a metre, of some 10⁷ waves, whose phase f64 knows to 10⁻⁸.
-const THICKEST: f64 = 1e9;
+/// The thickest film, nanometres: a tenth of a metre, less than 2¹⁸ waves, whose number f32 holds to a 64th or better. From there on
+/// it would know fewer phases than interference has.
+const THICKEST: f64 = 1e8;
 
 fn thickness(at: At<'_>, found: f64, checker: &mut Checker<'_>) {
-    checker.require((0.0..=THICKEST).contains(&found), at, "a thickness from 0 to 1e9 nm", found);
+    checker.require((0.0..=THICKEST).contains(&found), at, "a thickness from 0 to 1e8 nm", found);
 }

@@ -351,6 +351,13 @@ impl Light {
                 spot.intensity.check(Role::Emission, at.key("intensity"), checker);
                 if let Some(texture) = &spot.texture {
                     checker.texture(at.key("texture"), texture);
+                    // The picture is as wide as the tangent of that.
+                    checker.require(
+                        cutoff != 90.0,
+                        at.key("cutoff_deg"),
+                        "an angle below 90 degrees where the spot throws a picture",
+                        cutoff,
+                    );
                     let upright = !parallel(spot.axis().into(), spot.up.unwrap_or([0.0, 1.0, 0.0]));
                     let found = format_args!("one along it");
                     checker.require(upright, at.key("up"), "a direction that is not along the axis", found);
@@ -446,6 +453,11 @@ mod tests {
             "dir/s.yaml:3:90: lights[0].spot.beam_deg: expected an angle from 0 to cutoff_deg, 30 degrees, found 31"
         );
         assert_eq!(spot("cutoff_deg: 90, beam_deg: 90"), "none");
+        let told = spot("cutoff_deg: 90, texture: {checkerboard: {}}");
+        assert!(
+            told.ends_with("expected an angle below 90 degrees where the spot throws a picture, found 90"),
+            "{told}"
+        );
     }
 
     #[test]

@@ -183,7 +183,7 @@ impl Casters {
             let unseen = seen.insert((children.start, ball.is_none()));
             for child in children.filter(|_| unseen) {
                 casters.casts[child] = sharp(child);
-                casters.unending[child] = sharp(child) && ball.is_none();
+                casters.unending[child] |= sharp(child) && ball.is_none();
                 let parts = |scene: &Scene| is_dispersive(&scene.materials[scene.objects[child].material as usize]);
                 casters.parts |= sharp(child) && (parts(scene) || moments.iter().any(parts));
                 casters.single |= sharp(child) && is_single(material(child));

@@ -275,7 +275,7 @@ fn films_that_cannot_be_are_told_and_thick_ones_are_noted() {
     };
     assert_eq!(
         told("{dielectric: {ior: 1.5, film: {ior: 1.4, thickness_nm: -1}}}"),
-        "3:61: materials.m.dielectric.film.thickness_nm: expected a thickness from 0 to 1e9 nm, found -1"
+        "3:61: materials.m.dielectric.film.thickness_nm: expected a thickness from 0 to 1e8 nm, found -1"
     );
     assert_eq!(
         told("{dielectric: {ior: 1.5, fresnel: schlick, film: {ior: 1.4, thickness_nm: 1}}}"),
