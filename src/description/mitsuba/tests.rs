@@ -158,6 +158,24 @@ fn a_camera_may_be_turned_by_rounded_numbers() {
     assert!(sheared.ends_with(told), "{sheared}");
 }
 
+/// A turn by 45 degrees of what is 5 cm large, as C's `%f` prints it: 1.4e-5 of the scale away from one. What is stretched by more is
+/// refused as ever.
+#[test]
+fn balls_and_cylinders_may_be_placed_by_six_decimals() {
+    let placed = |plugin: &str, z: &str| {
+        let rows = format!("0.035355 -0.035355 0 1 0.035355 0.035355 0 2 0 0 {z} 3 0 0 0 1");
+        format!("<shape type=\"{plugin}\"><transform name=\"to_world\"><matrix value=\"{rows}\"/></transform></shape>")
+    };
+    let linear = DMat3::from_mat4(good(&placed("sphere", "0.05")).shapes[0].world_from_object());
+    let gram = linear.transpose() * linear;
+    let off = (gram - DMat3::IDENTITY * gram.x_axis.x).to_cols_array().map(f64::abs);
+    // Scale squared to the half of the sixth decimal, twice over 0.05.
+    assert!((gram.x_axis.x / 0.0025 - 1.0).abs() < 2e-5 && off.iter().all(|x| *x < 1e-15), "{gram}");
+    good(&placed("cylinder", "0.05"));
+    good(&placed("cylinder", "0.07"));
+    assert!(fault(&placed("sphere", "0.0501"), &[]).contains("expected moves, turns and even scaling"));
+}
+
 /// An element that nobody knows is told as that, whatever is in it.
 #[test]
 fn an_unknown_element_is_one_fault() {
