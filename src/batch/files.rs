@@ -45,7 +45,7 @@ pub fn write(
         image.standard_error.iter_mut().for_each(|plane| plane.fill(0.0));
     }
     report.pixel_hash = pixel_hash(&image);
-    let [_, png_path, spectral] = places(exr_path);
+    let [_, png_path, spectral_path] = places(exr_path);
     let shown = image.shown();
     let mut settings = finish.png_settings(&shown);
     settings.texts.extend(finish.png_marks(&report.pixel_hash));
@@ -58,16 +58,17 @@ pub fn write(
     if report.error.is_some() {
         report.error_map = heat::error_map(&shown, finish.space().matrix_to_xyz()[1], contact::SIDE);
     }
-    write_spectral(&spectral, finish, frame, &image, report)?;
+    let spectral =
+        spectral_image(finish, frame, &image, report).map(|mut file| sealed(&spectral_path, &mut file)).transpose()?;
     let (exr, png) =
         rayon::join(|| sealed_exr(exr_path, finish, frame, &image, report), || png::encode_png(&shown, &settings));
     let (exr, bytes) = exr?;
-    // They come to the disk together but are named one after the other: where the first cannot be written, nothing of the picture
-    // is left.
-    let both = [Some((exr_path, &*bytes)), png.as_ref().ok().map(|png| (&*png_path, &**png))];
-    output::write_together(&both.into_iter().flatten().collect::<Vec<_>>())?;
+    let png = png.map_err(|message| Error::output(&png_path, message))?;
+    // All or none: what stands there may be of another render.
+    let mut files = Vec::from_iter(spectral.as_ref().map(|bytes| (&*spectral_path, &**bytes)));
+    files.extend([(exr_path, &*bytes), (&*png_path, &*png)]);
+    output::write_together(&files)?;
     note_loss(exr_path, finish, &exr, report)?;
-    png.map_err(|message| Error::output(&png_path, message))?;
     report.files = of(finish, exr_path);
     report.seconds.writing = written.elapsed().as_secs_f64();
     sound
@@ -106,8 +107,7 @@ fn sealed_exr(
     report: &mut SceneReport,
 ) -> Result<(ExrImage, Vec<u8>)> {
     let mut file = exr_image(finish, frame, image, report);
-    seal(path, &mut file)?;
-    let bytes = exr::encode_exr(&file).map_err(|message| Error::output(path, message))?;
+    let bytes = sealed(path, &mut file)?;
     Ok((file, bytes))
 }
 
@@ -354,17 +354,9 @@ pub fn touched(path: &Path, whole: bool) -> Vec<PathBuf> {
     files
 }
 
-/// Writes bands of the spectrum as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral Images", JCGT
-/// 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength, W·m⁻²·sr⁻¹·nm⁻¹;
-/// R, G and B show them, and `stderr.S0.<nm>nm` is the standard error of each value where those are wanted.
-fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Result<()> {
-    match spectral_image(finish, frame, image, report) {
-        Some(mut file) => write_sealed(path, &mut file),
-        None => Ok(()),
-    }
-}
-
-/// What [`write_spectral`] writes, where it writes.
+/// Bands of the spectrum, where they are wanted, as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral
+/// Images", JCGT 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength,
+/// W·m⁻²·sr⁻¹·nm⁻¹; R, G and B show them, and `stderr.S0.<nm>nm` is the standard error of each value where those are wanted.
 fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Option<ExrImage> {
     let channels = finish.spectral_channels();
     if channels.is_empty() {
@@ -394,16 +386,11 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     })
 }
 
-/// Writes a file that says what its channels add up to, so that damage shows.
-fn write_sealed(path: &Path, file: &mut ExrImage) -> Result<()> {
-    seal(path, file)?;
-    exr::write_exr(path, file)
-}
-
-fn seal(path: &Path, file: &mut ExrImage) -> Result<()> {
-    let hash = Attribute::Text(file.content_hash().map_err(|message| Error::output(path, message))?);
-    file.attributes.push(("abbe/contentHash".to_owned(), hash));
-    Ok(())
+/// The bytes of a file that is to be at `path`, which says what its channels add up to, so that damage shows.
+fn sealed(path: &Path, file: &mut ExrImage) -> Result<Vec<u8>> {
+    let fail = |message| Error::output(path, message);
+    file.attributes.push(("abbe/contentHash".to_owned(), Attribute::Text(file.content_hash().map_err(fail)?)));
+    exr::encode_exr(file).map_err(fail)
 }
 
 /// 128 bits of BLAKE3 over the numbers of a picture.
@@ -421,6 +408,30 @@ fn pixel_hash(image: &Image) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::{Overrides, entries, prepare};
+    use std::sync::atomic::AtomicBool;
+
+    /// Where one cannot be written there is none: on a full disk a new file of bands stood beside the old picture.
+    #[test]
+    fn the_files_of_a_picture_are_all_there_or_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let [yaml, exr, png] = ["s.yaml", "a.exr", "a.png"].map(|name| dir.path().join(name));
+        let text = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 4, height: 4}\n\
+            render: {samples: 4}\nlights: [constant: {radiance: 1}]\noutput: {spectral: {bands: 1}}\n";
+        std::fs::write(&yaml, text).unwrap();
+        let none = Overrides::default();
+        let prepared = prepare(&entries(&yaml, &none).unwrap()[0], &none).unwrap();
+        let (filter, finish) = (prepared.sampler().unwrap(), Finish::of(&prepared));
+        let frame = frame::render(&prepared.job(&filter), &|_| {}, &AtomicBool::new(false)).unwrap();
+        let mut report = SceneReport::new("s", None);
+        std::fs::create_dir(&png).unwrap();
+        let e = write(&finish, &frame, Ok(()), &exr, &mut report).unwrap_err().to_string();
+        assert!(e.ends_with("a.png: cannot write: it is a directory"), "{e}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "the scene, and the directory");
+        std::fs::remove_dir(&png).unwrap();
+        write(&finish, &frame, Ok(()), &exr, &mut report).unwrap();
+        assert!(places(&exr).iter().all(|file| file.is_file()));
+    }
 
     /// Squares of f32 end at 1.8e19 and begin at 1.1e-19.
     #[test]

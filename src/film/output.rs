@@ -43,7 +43,7 @@ pub fn write_pieces(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::
 }
 
 /// Writes files that belong together, replacing what stands there. They reach the disk at the same time, on the current rayon pool,
-/// and take their names in turn: one that cannot be written leaves those behind it without theirs.
+/// and take their names only when all of them are there, in turn: where one cannot be written, all are as they were before.
 ///
 /// # Errors
 /// As [`write_atomically`], of the first.
@@ -56,15 +56,19 @@ pub fn write_together(files: &[(&Path, &[u8])]) -> Result<()> {
         },
     };
     let filled: Vec<Result<Option<Nameless>>> = files.par_iter().map(fill).collect();
+    let filled: Vec<Option<Nameless>> = filled.into_iter().collect::<Result<_>>()?;
+    // A stream, too, may fail when it is written.
+    let streams = files.iter().zip(&filled).filter(|(_, filled)| filled.is_none());
+    for (&(path, bytes), _) in streams {
+        write_atomically(path, bytes)?;
+    }
     let mut named: Vec<PathBuf> = Vec::new();
-    let all = files.iter().zip(filled).try_for_each(|(&(path, bytes), filled)| match filled? {
-        None => write_atomically(path, bytes),
-        Some(nameless) => {
-            let file = nameless.path.clone();
-            nameless.take_name().map_err(|e| Error::output(path, words(&file, &e)))?;
-            named.push(file);
-            Ok(())
-        }
+    let all = files.iter().zip(filled).try_for_each(|(&(path, _), filled)| {
+        let Some(nameless) = filled else { return Ok(()) };
+        let file = nameless.path.clone();
+        nameless.take_name().map_err(|e| Error::output(path, words(&file, &e)))?;
+        named.push(file);
+        Ok(())
     });
     // One directory is brought to the disk once.
     named.dedup_by(|a, b| directory_of(a) == directory_of(b));
@@ -454,20 +458,34 @@ mod tests {
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
-    /// The second is a directory: the first is there, the third is not, and nothing else.
+    /// The second is a directory: the first is as it was, the third is not there, and nothing else. The files of two renders stood
+    /// beside each other on a full disk.
     #[test]
-    fn files_that_belong_together_take_their_names_in_turn() {
+    fn files_that_belong_together_take_their_names_when_all_are_there() {
         let dir = tempfile::tempdir().unwrap();
         let paths = ["a", "b", "c"].map(|name| dir.path().join(name));
         let files = [0, 1, 2].map(|i| (&*paths[i], [&b"one"[..], b"two", b"three"][i]));
+        std::fs::write(&paths[0], "old").unwrap();
         std::fs::create_dir(&paths[1]).unwrap();
         assert!(write_together(&files).unwrap_err().to_string().contains("it is a directory"));
-        assert_eq!(std::fs::read(&paths[0]).unwrap(), b"one");
+        assert_eq!(std::fs::read(&paths[0]).unwrap(), b"old");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
         std::fs::remove_dir(&paths[1]).unwrap();
         write_together(&files).unwrap();
         assert!(files.iter().all(|(path, bytes)| std::fs::read(path).unwrap() == *bytes));
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 3);
+    }
+
+    /// A device that is always full.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_stream_that_fails_leaves_the_files_beside_it_as_they_were() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a");
+        std::fs::write(&path, "old").unwrap();
+        let e = write_together(&[(&*path, b"new"), (Path::new("/dev/full"), b"new")]).unwrap_err().to_string();
+        assert!(e.contains("/dev/full") && std::fs::read(&path).unwrap() == b"old", "{e}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[test]
