@@ -505,6 +505,17 @@ fn a_file_of_bands_that_does_not_hold_is_made_again() {
     }
 }
 
+/// As one writes beside bands of one's own, so that readers of spectral files know them.
+#[test]
+fn a_picture_that_names_the_layout_of_spectral_files_is_not_rendered_again() {
+    let place = Place::of(
+        "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 8, height: 8}\nrender: {samples: 4}\n\
+         output: {exr: {attributes: {spectralLayoutVersion: '1.0', emissiveUnits: 'W.m^-2.sr^-1'}}}\n\
+         lights: [{constant: {radiance: 1}}]\n",
+    );
+    assert!(!was_there(&place) && was_there(&place));
+}
+
 /// A picture of several parts is there once it is, with all its layers.
 #[test]
 fn a_picture_of_several_parts_is_not_rendered_again() {

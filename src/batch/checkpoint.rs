@@ -10,7 +10,7 @@ use super::develop;
 use super::files::spectral_path;
 use super::finish::Finish;
 use super::frame::{self, Begun, FrameJob, Milestone, lock};
-use super::header::FAULT;
+use super::header::{FAULT, SPECTRAL};
 use super::merge::sum;
 use super::names;
 use super::part::{Breaks, Part, Share, SplatFilm};
@@ -321,7 +321,7 @@ fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> Option<Found> {
     }
     // What is said of the whole file stands in its first part.
     let part = &file.parts[0];
-    let found = part.text("spectralLayoutVersion").map_or(Holds::Colours, |_| Holds::Bands);
+    let found = part.text(SPECTRAL).map_or(Holds::Colours, |_| Holds::Bands);
     let expected = [
         ("abbe/version", env!("CARGO_PKG_VERSION").to_owned()),
         ("abbe/sceneHash", finish.scene_hash.clone()),

@@ -2,7 +2,7 @@
 
 use super::finish::Finish;
 use super::frame::{self, Frame};
-use super::header::attributes;
+use super::header::{self, attributes};
 use super::prepare::colour_space;
 use super::report::{Developed, SceneReport};
 use super::{checkpoint, contact};
@@ -369,6 +369,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     let mut attributes = attributes(finish, frame, report, error.as_ref());
     let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
+    attributes.push((header::SPECTRAL.to_owned(), Attribute::Int(channels.len() as i32)));
     let errors = band_errors(finish, frame, channels.clone());
     attributes.extend(shared_errors(shared_errors_of_bands(finish, frame, channels.clone(), &errors)));
     let own = finish.layers[channels.clone()].iter().zip(errors);

@@ -12,6 +12,9 @@ use crate::transport::plan::Integrator;
 /// The attribute of a header that says what is wrong with a picture that is written all the same.
 pub(super) const FAULT: &str = "abbe/fault";
 
+/// That of the file of `output.spectral`: how many bands it has. Those of its layout may be the user's own in any file.
+pub(super) const SPECTRAL: &str = "abbe/spectralBands";
+
 /// Of light at 555 nm, lm/W.
 const LUMENS_PER_WATT: f64 = 683.002;
 
