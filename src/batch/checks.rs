@@ -1,11 +1,12 @@
 //! What is looked at before a picture is begun: whether it fits into memory, and whether its files may go where they are to.
 
-use super::prepare::Prepared;
-use super::{Overrides, ends_in, files, memory, names, output_path};
+use super::prepare::{Prepared, window};
+use super::{Overrides, Portion, adaptive, ends_in, files, layers, memory, names, output_path, place};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::output::Inputs;
+use crate::film::accumulate::Film;
+use crate::film::output::{self, Inputs};
 use std::path::Path;
 
 /// Refuses a picture whose sums, of `rows` and `needed` bytes, are more than the machine's memory or `limit`, before it is begun.
@@ -14,7 +15,7 @@ pub(super) fn fits(description: &SceneDescription, rows: Window, needed: u64, li
     if let Some(limit) = limit.filter(|limit| needed > *limit) {
         let [needed, limit] = [needed, limit].map(mebibytes);
         return Err(Error::Memory(format!(
-            "the sums of {rows} take {needed} MiB, more than --memory-limit, {limit} MiB"
+            "the sums of {rows} take at least {needed} MiB, more than --memory-limit, {limit} MiB"
         )));
     }
     let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX));
@@ -27,9 +28,30 @@ pub(super) fn fits(description: &SceneDescription, rows: Window, needed: u64, li
         None if *overscan > 0 => "image.overscan",
         None => "image.width",
     };
-    let message =
-        format!("expected a picture that fits into memory, found {rows}, which takes {} MiB", mebibytes(needed));
+    let message = format!(
+        "expected a picture that fits into memory, found {rows}, which takes at least {} MiB",
+        mebibytes(needed)
+    );
     Err(Error::Config(description.fault(field, &message)))
+}
+
+/// Refuses a picture of the scene `name` before anything is made ready for it, which may take minutes: one whose sums cannot
+/// [fit](fits), as far as the description alone tells, and one whose files cannot be written.
+pub(super) fn before_work(name: &str, description: &SceneDescription, overrides: &Overrides) -> Result<()> {
+    let Overrides { portion, keep, .. } = overrides;
+    // Where samples are shared out, which is not known yet, parts are cut between cells. A part that the picture does not have is
+    // told later.
+    let tile = Portion { tile: portion.tile, samples: None };
+    let rows = |rows: u32| Some(tile.share(window(description), 1, rows).ok()?.rows(window(description)));
+    if let Some(rows) = [1, adaptive::SIDE].into_iter().filter_map(rows).min_by_key(Window::pixels) {
+        fits(description, rows, Film::bytes(rows, layers::fewest(description)), overrides.memory_limit)?;
+    }
+    let path = place(&description.output.dir, name, description.frame, overrides);
+    // What is there already may be all that is wanted, and need not be written.
+    if (keep.resume || keep.skip_existing) && path.exists() {
+        return Ok(());
+    }
+    files::written(&path, &description.output, portion.is_all()).iter().try_for_each(|file| output::try_place(file))
 }
 
 /// The place that `option` gives for `scenes` scenes.

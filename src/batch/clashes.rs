@@ -1,6 +1,7 @@
 //! No two pictures of a job go to one file, and no report: what would be written twice is told before anything is rendered.
 
-use super::{Overrides, about_files, about_place, checkpoint, files, names, place, spectral_path};
+use super::files::{self, spectral_path};
+use super::{Overrides, about_files, about_place, checkpoint, names, place};
 use crate::description::{Animation, BatchEntry};
 use crate::error::{Error, Result};
 use crate::film::output::{self, Inputs};

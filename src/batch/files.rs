@@ -342,6 +342,16 @@ pub fn places(path: &Path) -> [PathBuf; 3] {
     [path.to_path_buf(), path.with_extension("png"), spectral_path(path)]
 }
 
+/// What the render of the picture at `path`, which is `whole` or a part, is going to write.
+#[must_use]
+pub fn written(path: &Path, output: &description::Output, whole: bool) -> Vec<PathBuf> {
+    let [exr, png, spectral] = places(path);
+    let mut files = vec![exr, checkpoint::place(path)];
+    files.extend(whole.then_some(png));
+    files.extend(output.spectral.filter(|_| whole).map(|_| spectral));
+    files
+}
+
 /// All files that a render of the picture at `path`, which is `whole` or a part, may write or take away, in its midst as well.
 #[must_use]
 pub fn touched(path: &Path, whole: bool) -> Vec<PathBuf> {

@@ -4,7 +4,7 @@ use super::finish;
 use super::prepare::{colour_space, integrator};
 use crate::description::{self, DEFAULT_GROUP, LayerContent, SceneDescription};
 use crate::error::Result;
-use crate::film::layers::Kept;
+use crate::film::layers::{Kept, Layout};
 use crate::scene::Scene;
 use crate::transport::layers::{Form, Layer, LayerPlan, Source};
 use crate::transport::middle::Middle;
@@ -15,6 +15,34 @@ use std::collections::BTreeSet;
 pub(super) fn wants_errors(description: &SceneDescription) -> bool {
     let asked = |layer: &description::Layer| layer.content == LayerContent::StandardError;
     description.output.exr.stderr || description.layers.iter().any(asked)
+}
+
+/// How the sums of a picture with so many bands are kept.
+fn kept(description: &SceneDescription, bands: usize) -> Kept {
+    // By them the error of a picture is told that has bands in place of colours.
+    let random = !matches!(description.integrator, description::Integrator::Whitted(_));
+    let told = random && !description.image.bands.is_empty();
+    if told || wants_errors(description) && bands > 0 { Kept::ByReplicate } else { Kept::Together }
+}
+
+/// No more than the channels of [`plan`], as far as the description alone tells: all bands, and one of each layer.
+pub(super) fn fewest(description: &SceneDescription) -> Layout {
+    let spectral = description.output.spectral.map_or(0, |spectral| spectral.bands as usize);
+    let bands = description.image.bands.len() + spectral;
+    let of = |layer: &&description::Layer| match layer.content {
+        LayerContent::Surface(_)
+        | LayerContent::Seen(_)
+        | LayerContent::Light { .. }
+        | LayerContent::Ways { .. }
+        | LayerContent::Middle(_) => true,
+        // There may be no lamps; the others are no sums.
+        LayerContent::LightGroups
+        | LayerContent::Matte(_)
+        | LayerContent::Variance
+        | LayerContent::StandardError
+        | LayerContent::SampleCount => false,
+    };
+    Layout { channels: bands + description.layers.iter().filter(of).count(), kept: kept(description, bands) }
 }
 
 /// The further channels of the picture.
@@ -29,12 +57,7 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
         sample_distance: 1.0 / f64::from(samples).sqrt(),
         ..LayerPlan::default()
     };
-    // By them the error of a picture is told that has bands in place of colours.
-    let random = !matches!(description.integrator, description::Integrator::Whitted(_));
-    let told = random && !description.image.bands.is_empty();
-    if told || wants_errors(description) && !scene.bands.is_empty() {
-        plan.kept = Kept::ByReplicate;
-    }
+    plan.kept = kept(description, scene.bands.len());
     for (i, band) in scene.bands.iter().enumerate() {
         plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: None });
     }

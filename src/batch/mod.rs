@@ -40,7 +40,6 @@ use crate::film::output::{self, Inputs};
 use crate::scene::shelf::Shelf;
 use checkpoint::{Keep, Keeper};
 use contact::Contact;
-use files::spectral_path;
 use finish::Finish;
 use forecast::Forecast;
 use frame::{Progress, go_on};
@@ -232,14 +231,9 @@ fn render_and_write(
         return ended;
     }
     // A place that cannot be written to is told before the work, not after.
-    output::prepare_place(&exr_path)?;
-    output::prepare_place(&checkpoint::place(&exr_path))?;
-    if overrides.portion.is_all() {
-        output::prepare_place(&exr_path.with_extension("png"))?;
-        if description.output.spectral.is_some() {
-            output::prepare_place(&spectral_path(&exr_path))?;
-        }
-    }
+    files::written(&exr_path, &description.output, portion.is_all())
+        .iter()
+        .try_for_each(|file| output::prepare_place(file))?;
     let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref(), watcher);
     let asked = Instant::now();
     let begun = keeper.begin(&job, share)?;
@@ -292,7 +286,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     'batch: for (i, entry) in entries.iter().enumerate() {
         let mut loading = Instant::now();
         let animation = entry.animation(&overrides.set);
-        read.add(animation.iter().flat_map(|animation| animation.files()));
+        read.add(animation.iter().flat_map(|animation| [animation.files(), animation.named_files()].concat()));
         let frames = animation.as_ref().map_or(1, |animation| animation.frames().len().max(1));
         let animation = animation.and_then(|a| checks::frames("-o", overrides.output.as_deref(), frames).map(|()| a));
         // One that cannot be read is a picture that fails.
@@ -309,7 +303,13 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 break 'batch;
             }
             watcher.scene_begins(Turn { scene: [i, entries.len()], frame: [n, frames] }, &label);
-            let prepared = description.and_then(|d| prepare_one_of(entry, d, overrides, &mut shelf, stop, watcher));
+            let prepared = description.and_then(|d| {
+                if let Err(e) = checks::before_work(&entry.name, &d, overrides) {
+                    report_dir.get_or_insert_with(|| about_place(&d.output.dir, d.frame.is_some(), overrides));
+                    return Err(e);
+                }
+                prepare_one_of(entry, d, overrides, &mut shelf, stop, watcher)
+            });
             if i + 1 == entries.len() && n + 1 == frames {
                 // Nobody comes after the last one.
                 shelf = Shelf::default();

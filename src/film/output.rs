@@ -357,12 +357,8 @@ pub fn directory_of(file: &Path) -> &Path {
 /// # Errors
 /// As [`write_atomically`].
 pub fn prepare_place(file: &Path) -> Result<()> {
-    if file.as_os_str().as_encoded_bytes().last().is_some_and(|byte| std::path::is_separator(char::from(*byte))) {
-        return Err(Error::output(file, "expected the name of a file, found that of a directory"));
-    }
-    let Target::File(end) = target(file)? else { return Ok(()) };
+    let Some(end) = named_end(file)? else { return Ok(()) };
     let directory = directory_of(&end);
-    let fail = |e: std::io::Error| Error::output(file, words(&end, &e));
     if directory.exists() && !directory.is_dir() {
         return Err(Error::output(file, format!("{} is not a directory", directory.display())));
     }
@@ -371,15 +367,48 @@ pub fn prepare_place(file: &Path) -> Result<()> {
         ErrorKind::AlreadyExists => {
             Error::output(file, format!("{} leads through a symbolic link to nowhere", directory.display()))
         }
-        _ => fail(e),
+        _ => Error::output(file, words(&end, &e)),
     })?;
+    probe(file, &end, directory)
+}
+
+/// [`prepare_place`] that makes nothing, for what may come to nothing yet: directories that are not there could be made in the one
+/// above them that is.
+///
+/// # Errors
+/// As [`prepare_place`], but for what only the making of directories tells.
+pub fn try_place(file: &Path) -> Result<()> {
+    let Some(end) = named_end(file)? else { return Ok(()) };
+    let directory = directory_of(&end);
+    let there = directory.ancestors().find(|above| above.exists()).unwrap_or(Path::new("."));
+    match there.is_dir() {
+        true => probe(file, &end, there),
+        false => Err(Error::output(file, format!("{} is not a directory", directory.display()))),
+    }
+}
+
+/// Where the file at `file` ends up, whose name is none of a directory; none of a stream.
+fn named_end(file: &Path) -> Result<Option<PathBuf>> {
+    if file.as_os_str().as_encoded_bytes().last().is_some_and(|byte| std::path::is_separator(char::from(*byte))) {
+        return Err(Error::output(file, "expected the name of a file, found that of a directory"));
+    }
+    Ok(match target(file)? {
+        Target::File(end) => Some(end),
+        Target::Stream(_) => None,
+    })
+}
+
+/// Tries whether a file with the name of `end`, which is where `file` leads, could be made in `directory`.
+fn probe(file: &Path, end: &Path, directory: &Path) -> Result<()> {
+    let fail = |e: std::io::Error| Error::output(file, words(end, &e));
     // A temporary name is shorter than one that is too long.
-    if let Err(e) = std::fs::symlink_metadata(&end)
+    if let Err(e) = std::fs::symlink_metadata(end)
         && e.kind() == ErrorKind::InvalidFilename
     {
         return Err(fail(e));
     }
-    let (_, probe) = open_temporary(&end).map_err(fail)?;
+    let name = end.file_name().ok_or_else(|| fail(ErrorKind::IsADirectory.into()))?;
+    let (_, probe) = open_temporary(&directory.join(name)).map_err(fail)?;
     std::fs::remove_file(&probe).map_err(fail)
 }
 
@@ -503,6 +532,20 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let e = prepare_place(&dir.path().join("new/")).unwrap_err().to_string();
         assert!(e.ends_with("expected the name of a file, found that of a directory"), "{e}");
+    }
+
+    #[test]
+    fn a_place_is_tried_without_a_trace() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = |name: &str| try_place(&dir.path().join(name)).map_err(|e| e.to_string());
+        std::fs::write(dir.path().join("file"), "").unwrap();
+        assert_eq!((place("a.exr"), place("new/deep/a.exr"), place("file")), (Ok(()), Ok(()), Ok(())));
+        for below in ["file", "file/deep"] {
+            let told = format!("{} is not a directory", dir.path().join(below).display());
+            assert!(place(&format!("{below}/a.exr")).unwrap_err().ends_with(&told));
+        }
+        assert!(place("new/").unwrap_err().ends_with("found that of a directory"));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[cfg(unix)]

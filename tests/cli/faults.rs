@@ -429,6 +429,23 @@ fn a_picture_larger_than_memory_is_refused_at_its_field() {
     assert!(ran.err.contains("image.overscan: expected a picture that fits into memory"), "{}", ran.err);
 }
 
+/// What the scene names is not there: it is not even looked for. Lamps in mirrors were searched, for a minute, in what has no room.
+#[test]
+fn a_picture_larger_than_memory_is_refused_before_the_scene_is_made_ready() {
+    let large = SMALL.replace("width: 4, height: 4", "width: 65536, height: 65536");
+    let place = Place::of(&format!("{large}shapes: [mesh: {{file: none.obj}}]\n"));
+    for (more, told, code) in [
+        (&[][..], "image.width: expected a picture that fits into memory", 2),
+        (&["--tile", "1/2"], "image.width: expected a picture that fits into memory", 2),
+        (&["--memory-limit", "1G"], "more than --memory-limit, 1024 MiB", 33),
+        (&["--set", "image={width: 4, height: 4}"], "none.obj", 3),
+    ] {
+        let ran = place.run(&[&["render", "scene.yaml", "-q", "-o", "out"], more].concat());
+        assert!(ran.err.contains(told) && ran.code == code, "{}", ran.err);
+    }
+    assert!(!place.path("out").exists());
+}
+
 /// A name that is too long for a file, or for what stands beside it on the way, is told before the work.
 #[cfg(unix)]
 #[test]

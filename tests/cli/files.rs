@@ -33,6 +33,21 @@ fn an_unwritable_place_is_told_before_the_work() {
     assert_eq!(place.names("out"), Vec::<String>::new());
 }
 
+/// What the scene names is not there, and not looked for; nor is a directory made for what comes to nothing.
+#[test]
+fn an_unwritable_place_is_told_before_the_scene_is_made_ready() {
+    let place = Place::with(&[
+        ("scene.yaml", &format!("{SMALL}shapes: [mesh: {{file: none.obj}}]\n")),
+        ("taken", "a regular file"),
+    ]);
+    let ran = place.run(&["render", "scene.yaml", "-q", "-o", "taken/deep"]);
+    let told = "error: scene: taken/deep/scene.exr: cannot write: taken/deep is not a directory\n";
+    assert_eq!((&*ran.err, ran.code), (told, 1));
+    let ran = place.run(&["render", "scene.yaml", "-q", "-o", "new/deep"]);
+    assert!(ran.err.contains("none.obj") && ran.code == 3, "{}", ran.err);
+    assert!(!place.path("new").exists());
+}
+
 /// Permissions do not bind root, who is told so and let off.
 #[test]
 fn a_directory_without_permission_is_named() {
