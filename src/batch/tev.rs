@@ -1,7 +1,8 @@
 //! The picture as it grows, in the tev viewer on this machine or another: `--tev HOST:PORT`.
 //!
-//! A thread of its own sends what it is given; a render that is ahead of the viewer leaves pictures out, and waits for
-//! nothing. A viewer that is not there, or goes away, is told of once, and the render goes on without it.
+//! A thread of its own sends what it is given; a render that is ahead of the viewer leaves pictures out. Only the last state of
+//! a picture waits for the one before it, as long as that may be on its way. A viewer that is not there, goes away, or has not
+//! taken a picture by then is told of once, and the render goes on without it.
 //!
 //! Source: the inter-process protocol of tev (Müller): packets of little-endian numbers, each its own length in 32 bits, a
 //! byte of type, and a body; text ends in a zero. Type 4 makes an image (whether to show it, name, width, height, number and
@@ -11,14 +12,13 @@ use super::frame::lock;
 use crate::film::resolve::Image;
 use std::io::{ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How long to wait for a viewer to answer, and for it to take what it is sent.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a picture may be on its way to a viewer; half of it, how long the viewer may take to answer at all.
+const PATIENCE: Duration = Duration::from_secs(4);
 /// Side of a tile, pixels.
 const TILE: usize = 128;
 /// Least time between two states of one picture.
@@ -28,6 +28,8 @@ pub const EVERY: Duration = Duration::from_millis(500);
 struct Picture {
     name: String,
     image: Image,
+    /// When it must be there.
+    until: Instant,
 }
 
 /// The way to a viewer.
@@ -39,12 +41,30 @@ pub struct Viewer {
     state: Arc<State>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct State {
-    /// A picture is on its way.
-    busy: AtomicBool,
+    /// `HOST:PORT`.
+    place: String,
+    /// When the picture that is on its way must be there, if one is.
+    on_its_way: Mutex<Option<Instant>>,
     /// Why nothing is sent any more.
     gone: Mutex<Option<String>>,
+}
+
+impl State {
+    /// From now on the viewer counts as gone.
+    fn leave(&self, why: &std::io::Error) {
+        let told = || format!("tev at {}: {}; rendered without it", self.place, words(why));
+        lock(&self.gone).get_or_insert_with(told);
+    }
+
+    fn is_gone(&self) -> bool {
+        lock(&self.gone).is_some()
+    }
+
+    fn is_busy(&self) -> bool {
+        lock(&self.on_its_way).is_some()
+    }
 }
 
 impl Viewer {
@@ -52,36 +72,36 @@ impl Viewer {
     #[must_use]
     pub fn new(place: &str) -> Viewer {
         let (queue, pictures) = sync_channel(1);
-        let state = Arc::new(State::default());
-        let without =
-            |place: &str, e: std::io::Error| Some(format!("tev at {place}: {}; rendered without it", words(&e)));
-        let (to, away) = (place.to_owned(), Arc::clone(&state));
+        let state = State { place: place.to_owned(), on_its_way: Mutex::default(), gone: Mutex::default() };
+        let state = Arc::new(state);
+        let away = Arc::clone(&state);
         let thread = std::thread::Builder::new().spawn(move || {
-            if let Err(e) = serve(&to, &pictures, &away) {
-                *lock(&away.gone) = without(&to, e);
+            if let Err(e) = serve(&pictures, &away) {
+                away.leave(&e);
             }
-            away.busy.store(false, Ordering::Relaxed);
+            *lock(&away.on_its_way) = None;
         });
-        let thread = thread.map_err(|e| *lock(&state.gone) = without(place, e)).ok();
+        let thread = thread.map_err(|e| state.leave(&e)).ok();
         Viewer { queue: Mutex::new(Some(queue)), thread: Mutex::new(thread), state }
     }
 
     /// Whether it would take a picture now: none is on its way, and it has not gone.
     #[must_use]
     pub fn is_ready(&self) -> bool {
-        !self.state.busy.load(Ordering::Relaxed) && lock(&self.state.gone).is_none()
+        !self.state.is_busy() && !self.state.is_gone()
     }
 
     /// Shows `image` under `name`, if nothing else is on its way.
     pub fn show(&self, name: &str, image: Image) {
-        let Some(queue) = lock(&self.queue).clone() else { return };
-        self.state.busy.store(true, Ordering::Relaxed);
-        if let Err(TrySendError::Disconnected(_)) = queue.try_send(Picture { name: name.to_owned(), image }) {
-            self.state.busy.store(false, Ordering::Relaxed);
+        let Some(queue) = lock(&self.queue).clone().filter(|_| !self.state.is_gone()) else { return };
+        let until = Instant::now() + PATIENCE;
+        *lock(&self.state.on_its_way) = Some(until);
+        if let Err(TrySendError::Disconnected(_)) = queue.try_send(Picture { name: name.to_owned(), image, until }) {
+            *lock(&self.state.on_its_way) = None;
         }
     }
 
-    /// Shows the last state of a picture: waits, but no longer than the viewer's patience, for those before it.
+    /// Shows the last state of a picture: waits, but no longer than the viewer's patience, for the one before it.
     pub fn show_last(&self, name: &str, image: Image) {
         self.wait();
         self.show(name, image);
@@ -93,7 +113,7 @@ impl Viewer {
         self.wait();
         drop(lock(&self.queue).take());
         if let Some(thread) = lock(&self.thread).take()
-            && !self.state.busy.load(Ordering::Relaxed)
+            && !self.state.is_busy()
         {
             // It has nothing left to do but to end.
             let _ = thread.join();
@@ -101,10 +121,15 @@ impl Viewer {
         lock(&self.state.gone).take()
     }
 
+    /// Waits until the picture that is on its way is there, or until it must have been: then the viewer counts as gone.
     fn wait(&self) {
-        let start = Instant::now();
-        while self.state.busy.load(Ordering::Relaxed) && start.elapsed() < 2 * PATIENCE {
-            std::thread::sleep(Duration::from_millis(2));
+        loop {
+            let on_its_way = *lock(&self.state.on_its_way);
+            match on_its_way {
+                None => return,
+                Some(until) if Instant::now() >= until => return self.state.leave(&late()),
+                Some(_) => std::thread::sleep(Duration::from_millis(2)),
+            }
         }
     }
 }
@@ -113,34 +138,53 @@ impl Viewer {
 fn words(e: &std::io::Error) -> String {
     match e.kind() {
         // So the system says that the time for writing is over.
-        ErrorKind::WouldBlock => format!("it took nothing for {:?}", PATIENCE / 2),
+        ErrorKind::WouldBlock => format!("it did not take a picture within {PATIENCE:?}"),
         _ => e.to_string(),
     }
 }
 
+/// That the time of a picture is over.
+fn late() -> std::io::Error {
+    ErrorKind::WouldBlock.into()
+}
+
 /// Connects, and sends pictures until there are no more.
-fn serve(place: &str, pictures: &Receiver<Picture>, state: &State) -> std::io::Result<()> {
-    let addresses = place.to_socket_addrs()?;
+fn serve(pictures: &Receiver<Picture>, state: &State) -> std::io::Result<()> {
+    let addresses = state.place.to_socket_addrs()?;
     let mut stream = Err(std::io::Error::other("no such address"));
     for address in addresses {
-        stream = TcpStream::connect_timeout(&address, PATIENCE);
+        stream = TcpStream::connect_timeout(&address, PATIENCE / 2);
         if stream.is_ok() {
             break;
         }
     }
     let mut stream = stream?;
-    // A packet that is taken in part waits twice: once for the rest of it, once for nothing.
-    stream.set_write_timeout(Some(PATIENCE / 2))?;
     let mut known: Vec<String> = Vec::new();
-    for Picture { name, image } in pictures {
+    for Picture { name, image, until } in pictures {
         if !known.contains(&name) {
-            stream.write_all(&create(&name, [image.window.width, image.window.height]))?;
+            send(&mut stream, &create(&name, [image.window.width, image.window.height]), until)?;
             known.push(name.clone());
         }
-        for packet in tiles(&name, &image) {
-            stream.write_all(&packet)?;
+        tiles(&name, &image).try_for_each(|packet| send(&mut stream, &packet, until))?;
+        *lock(&state.on_its_way) = None;
+    }
+    Ok(())
+}
+
+/// Sends a packet `until` its time is over: one that is taken a little now and then would never be late for each little.
+fn send(stream: &mut TcpStream, mut packet: &[u8], until: Instant) -> std::io::Result<()> {
+    while !packet.is_empty() {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(late());
         }
-        state.busy.store(false, Ordering::Relaxed);
+        stream.set_write_timeout(Some(left))?;
+        match stream.write(packet) {
+            Ok(0) => return Err(ErrorKind::WriteZero.into()),
+            Ok(taken) => packet = &packet[taken..],
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
     }
     Ok(())
 }
@@ -307,7 +351,27 @@ mod tests {
         }
         assert!(start.elapsed() < PATIENCE, "{:?}", start.elapsed());
         let said = viewer.close().unwrap();
-        assert!(said.ends_with(": it took nothing for 1s; rendered without it"), "{said}");
-        assert!(start.elapsed() < 4 * PATIENCE, "{:?}", start.elapsed());
+        assert!(said.ends_with(": it did not take a picture within 4s; rendered without it"), "{said}");
+        assert!(start.elapsed() < 2 * PATIENCE, "{:?}", start.elapsed());
+    }
+
+    /// One that takes a little now and then, 200 kB of 64 MB a second: it held up the end of each picture, and lost it without a word.
+    #[test]
+    fn a_viewer_that_is_slow_delays_one_picture_and_is_told() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let viewer = Viewer::new(&listener.local_addr().unwrap().to_string());
+        std::thread::spawn(move || {
+            let (mut stream, mut bytes) = (listener.accept().unwrap().0, [0; 2000]);
+            while stream.read(&mut bytes).is_ok_and(|n| n > 0) {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        });
+        let start = Instant::now();
+        for name in ["a", "b", "c"] {
+            viewer.show_last(name, picture(2000, 2000));
+        }
+        let said = viewer.close().unwrap();
+        assert!(said.ends_with(": it did not take a picture within 4s; rendered without it"), "{said}");
+        assert!(start.elapsed() < 2 * PATIENCE, "{:?}", start.elapsed());
     }
 }
