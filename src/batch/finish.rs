@@ -176,6 +176,7 @@ impl Finish {
         let time = stop.time.map(|time| time.as_secs_f64());
         let target = stop.is_open().then_some(Target { error: stop.error, time, planned: *planned });
         let (white, note) = develop::white(&description.output.png, scene);
+        let mattes = mattes::mattes(description, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
@@ -196,7 +197,14 @@ impl Finish {
             techniques: plan.techniques.clone(),
             lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
-            notes: scene.notes.iter().cloned().chain(note).chain(mattes::shared_names(description)).collect(),
+            notes: scene
+                .notes
+                .iter()
+                .cloned()
+                .chain(note)
+                .chain(mattes::shared_names(description))
+                .chain(mattes::shared_ids(&mattes))
+                .collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
             screen_window: scene.camera.screen_window().and_then(finite),
@@ -209,7 +217,7 @@ impl Finish {
             kept: plan.layers.kept,
             variance: asked(&LayerContent::Variance),
             sample_count: asked(&LayerContent::SampleCount),
-            mattes: mattes::mattes(description, scene),
+            mattes,
             lens: Lens::of(&scene.camera, description.camera.shutter.as_ref()),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::prepare::filter;
 use crate::description::{self, LayerContent, MaterialRef, SceneDescription, Shape};
-use crate::film::cryptomatte::Matte;
+use crate::film::cryptomatte::{Matte, id_of};
 use crate::film::filter::FilterSampler;
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -91,6 +91,22 @@ pub(super) fn shared_names(description: &SceneDescription) -> Vec<String> {
         for (name, what) in meanings.into_iter().filter(|(_, what)| what.len() > 1) {
             let what = Vec::from_iter(what).join(" and of ");
             told.push(format!("{}: the name `{name}` is that of {what}: they are one matte", matte.layer()));
+        }
+    }
+    told
+}
+
+/// Notes on names of which a matte cannot tell one from the other: of 10,000 two have one id in every hundredth scene.
+pub(super) fn shared_ids(mattes: &[Matte]) -> Vec<String> {
+    let mut told = Vec::new();
+    for matte in mattes {
+        let mut names: BTreeMap<u32, BTreeSet<&str>> = BTreeMap::new();
+        for name in matte.names.iter().flatten() {
+            names.entry(id_of(name).to_bits()).or_default().insert(name);
+        }
+        for (id, names) in names.into_iter().filter(|(_, names)| names.len() > 1) {
+            let names = Vec::from_iter(names).join("` and `");
+            told.push(format!("{}: the names `{names}` have one id, {id:08x}: they are one matte", matte.layer));
         }
     }
     told

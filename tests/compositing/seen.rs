@@ -635,4 +635,11 @@ fn names_of_two_things_in_one_matte_are_told() {
         "CryptoAsset: the name `oak` is that of a group and of a shape: they are one matte",
     ];
     assert_eq!(notes(&groups), told);
+    // The MurmurHash3 of both is 04ff3211.
+    let one = "shapes:\n- sphere: {name: n0197954, radius: 0.5, material: gold}\n";
+    let two = format!("{one}- sphere: {{name: n0136817, center: [2, 0, 0], radius: 0.5, material: gold}}\n");
+    let told = ["CryptoObject", "CryptoAsset"]
+        .map(|layer| format!("{layer}: the names `n0136817` and `n0197954` have one id, 04ff3211: they are one matte"));
+    assert_eq!(notes(&two), told);
+    assert!(notes(one).is_empty());
 }
