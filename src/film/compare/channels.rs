@@ -107,8 +107,12 @@ fn same_colours(a: &ExrFile, b: &ExrFile) -> Result<(), String> {
 
 fn compared_names(a: &ExrFile, b: &ExrFile) -> Result<Vec<String>, String> {
     let (of_a, of_b) = (own_names(a), own_names(b));
-    if of_a.is_empty() || BTreeSet::from_iter(&of_a) != BTreeSet::from_iter(&of_b) {
-        return Err(format!("the channels differ: {} against {}", of_a.join(", "), of_b.join(", ")));
+    if of_a.is_empty() && of_b.is_empty() {
+        return Err("neither file holds light".to_owned());
+    }
+    if BTreeSet::from_iter(&of_a) != BTreeSet::from_iter(&of_b) {
+        let list = |names: &[String]| if names.is_empty() { "none of light".to_owned() } else { names.join(", ") };
+        return Err(format!("the channels differ: {} against {}", list(&of_a), list(&of_b)));
     }
     Ok(of_a)
 }
@@ -186,6 +190,13 @@ mod tests {
         let mut other = a.clone();
         other.parts[0].channels.iter_mut().for_each(|(name, _)| name.push('x'));
         assert_eq!(reason(&other), "the channels differ: R, G, B against Rx, Gx, Bx");
+        // Alpha is no light, and not compared.
+        let mut cover = a.clone();
+        cover.parts[0].channels.truncate(1);
+        cover.parts[0].channels[0].0 = "A".into();
+        assert_eq!(reason(&cover), "the channels differ: R, G, B against none of light");
+        let told = compare(&cover, &cover, &CompareOptions::default());
+        assert_eq!((told.verdict, &*told.reason), (Verdict::CannotCompare, "neither file holds light"));
         // Words of whole numbers, of which the lower ones are as good as random.
         let mut sums = a.clone();
         sums.parts[0].texts.push(("abbe/part".into(), "{}".into()));
