@@ -66,7 +66,9 @@ pub(super) fn attributes(
         ("expTime", lens.shutter.zip(finish.frames_per_second).map(|(share, rate)| share / rate)),
         ("whiteLuminance", white_luminance(finish)),
     ] {
-        all.extend(value.map(|value| (name.to_owned(), Attribute::Float(value as f32))));
+        // What a float does not hold, as the focal length of next to no angle, is not said, as the user may not say it.
+        let value = value.map(|value| value as f32).filter(|value| value.is_finite());
+        all.extend(value.map(|value| (name.to_owned(), Attribute::Float(value))));
     }
     let written = &finish.output.exr.attributes;
     if !written.contains_key("comments") {
@@ -155,6 +157,34 @@ fn time_code(start: [u32; 4], number: Option<i32>, rate: Option<f64>) -> TimeCod
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::finish::Lens;
+    use crate::batch::frame::Gauge;
+    use crate::batch::{Overrides, entries, prepare};
+    use crate::film::Window;
+    use crate::film::accumulate::Film;
+    use std::time::Duration;
+
+    /// 3.4e38 is the most that a float holds; white is 683.002 · 106.857 / 1.2e-38 = 6.1e42 cd·m⁻².
+    #[test]
+    fn numbers_beyond_floats_are_left_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let yaml = dir.path().join("s.yaml");
+        std::fs::write(&yaml, "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n").unwrap();
+        let none = Overrides::default();
+        let prepared = prepare(&entries(&yaml, &none).unwrap()[0], &none).unwrap();
+        let film = Film::new([1, 1], Window::full(1, 1)).unwrap();
+        let of = |lens: [f64; 3], sensitivity: f64| {
+            let [focal_length_mm, aperture, focus] = lens.map(Some);
+            let lens = Lens { focal_length_mm, aperture, focus, shutter: None };
+            let finish = Finish { lens, sensitivity, ..Finish::of(&prepared) };
+            let frame = Frame::of(film.clone(), None, 0, Duration::ZERO, &Gauge { random: false, ..finish.gauge() });
+            let all = attributes(&finish, &frame, &SceneReport::new("s", None), None);
+            let names = ["nominalFocalLength", "aperture", "focus", "whiteLuminance"];
+            names.map(|name| all.iter().any(|(other, _)| other == name))
+        };
+        assert_eq!(of([50.0, 2.8, 3.4e38], 1.0), [true; 4]);
+        assert_eq!(of([1e300, f64::INFINITY, 3.5e38], 1.2e-38), [false; 4]);
+    }
 
     #[test]
     fn rates_of_television_are_over_1001() {
