@@ -177,7 +177,8 @@ fn row(s: &SceneReport) -> [String; 7] {
     let half = s.halving_seconds.map_or("-".into(), |t| format!("+{}", seconds(t)));
     [
         s.label(),
-        s.adaptive.as_ref().map_or(s.samples.to_string(), |counts| format!("{:.1}", counts.mean)),
+        // Of those that are shared out `samples` is the number for which that is done.
+        s.adaptive.as_ref().map_or(s.samples.to_string(), |counts| format!("mean {:.1}", counts.mean)),
         seconds(s.seconds.rendering),
         format!("{:.2}", s.msamples_per_second),
         error,
@@ -271,6 +272,7 @@ pub fn table(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::report::SampleCounts;
     use crate::error::Error;
 
     /// A picture that ended with `error`.
@@ -300,6 +302,13 @@ mod tests {
         let told: Vec<String> =
             notes(&frames.iter().collect::<Vec<_>>()).iter().map(|(s, note)| format!("{} {note}", s.label())).collect();
         assert_eq!(told, ["a.0001 dark", "a.0002 cold", "a.0004 dark", "b.0004 dark"]);
+    }
+
+    #[test]
+    fn samples_that_are_shared_out_are_told_by_their_mean() {
+        let adaptive = Some(SampleCounts { least: 32, mean: 84.0, most: 512 });
+        assert_eq!(row(&SceneReport { samples: 72, adaptive, ..SceneReport::new("a", None) })[1], "mean 84.0");
+        assert_eq!(row(&SceneReport { samples: 72, ..SceneReport::new("a", None) })[1], "72");
     }
 
     #[test]
