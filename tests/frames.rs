@@ -165,7 +165,7 @@ fn a_frame_is_exported_as_it_stands() {
         (
             render.iter().copied().collect::<std::collections::BTreeSet<_>>().len(),
             rest.join("\n"),
-            text.contains("{samples: 2, seed: 4}"),
+            text.contains("<?abbe set render.seed: 4?>") && text.contains("name=\"spp\" value=\"2\""),
         )
     };
     let frame = exported(&["a.yaml", "--frames", "4-9", "--spp", "2"]);

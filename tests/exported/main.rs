@@ -1,5 +1,6 @@
 //! A scene that is written for Mitsuba and read back is the same scene: it gives the same picture.
 
+mod camera;
 #[path = "../common/mod.rs"]
 mod common;
 mod sides;

@@ -35,10 +35,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::super::node::{Node, Sources, Value};
+use super::super::node::{Entry, Node, Sources, Value};
 use super::super::path::{self, Segment, field};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
+use super::super::settings::Render;
 use super::super::texture::Texture;
 use super::{DAYLIGHT, FILM, SKY_FROM_MITSUBA};
 use xml::Xml;
@@ -210,9 +211,9 @@ struct Export<'a> {
     images: BTreeMap<PathBuf, String>,
 }
 
-/// Settings that are about the work and the files, not about the light: Mitsuba has other words for
-/// some, but the same ones mean other things.
-const SETTINGS: [&str; 6] = ["render", "output", "fog", "layers", "light_groups", "assets"];
+/// Settings that are about the files, not about the light, and what Mitsuba has no words for: it has other words for some, but the
+/// same ones mean other things.
+const SETTINGS: [&str; 5] = ["output", "fog", "layers", "light_groups", "assets"];
 
 /// All that is said, in one sentence; `None` of nothing.
 fn joined(said: impl IntoIterator<Item = Option<String>>) -> Option<String> {
@@ -237,8 +238,7 @@ impl<'a> Export<'a> {
                 }
             }
         }
-        let samples = self.scene.render.samples.to_string();
-        self.xml.leaf("default", &[("name", "spp"), ("value", &samples)]);
+        self.render();
         self.integrator();
         self.sensor();
         for (name, texture) in &self.scene.textures {
@@ -270,6 +270,23 @@ impl<'a> Export<'a> {
             }
         }
         self.xml.close();
+    }
+
+    /// How the picture is rendered. How many samples are taken the parameter of the file says, to both.
+    fn render(&mut self) {
+        let Render { samples, stop, .. } = &self.scene.render;
+        // Where they are drawn until a target is reached, their number is none of the file's.
+        let has_target = stop.error.is_some() || stop.time.is_some();
+        let said_by_parameter = |key: &str| key == "samples" || key == "stop" && !has_target;
+        let says_more = |entry: &&Entry| !said_by_parameter(&entry.key) && !matches!(entry.node.value, Value::Null);
+        if let Some(Value::Map(entries)) = self.root.get("render").map(|node| &node.value) {
+            for entry in entries.iter().filter(says_more) {
+                let yaml = self.yaml(&entry.node);
+                self.xml.instruction(&format!("set {}: {yaml}", field(&["render", &entry.key])));
+            }
+        }
+        let samples = if has_target { *samples } else { self.scene.render.most_samples() };
+        self.xml.leaf("default", &[("name", "spp"), ("value", &samples.to_string())]);
     }
 
     /// Names of the materials that shapes have, or that such materials are made of.

@@ -1,0 +1,59 @@
+//! The camera, its film and the samples that it takes.
+
+use super::{Folder, exported};
+use abbe::batch::{self, Overrides};
+use abbe::description::{Exported, SceneDescription};
+use std::path::Path;
+
+/// A ball under an even sky, and `more`.
+fn ball(more: &str) -> String {
+    let camera =
+        if more.contains("camera: ") { "" } else { "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n" };
+    format!(
+        "{camera}integrator: {{path: {{opaque_sky: true}}}}\nshapes: [sphere: {{radius: 1}}]\n\
+         lights: [constant: {{radiance: 0.5}}]\n{more}\n"
+    )
+}
+
+/// The scene of a file, whose parameters have these values.
+fn scene_of(file: &Path, define: &[(&str, &str)]) -> SceneDescription {
+    let define = define.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+    let overrides = Overrides { define, ..Overrides::default() };
+    let entry = batch::entries(file, &overrides).unwrap_or_else(|error| panic!("{error}")).remove(0);
+    entry.scene(&overrides.set).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A scene, its export, and what is read of that with these values of its parameters.
+fn there_and_back(scene: &str, define: &[(&str, &str)]) -> (SceneDescription, Exported, SceneDescription) {
+    let folder = Folder::new();
+    folder.write(scene);
+    let ours = scene_of(&folder.yaml, &[]);
+    let xml = folder.directory.path().join("s.xml");
+    let exported = exported(&ours, &xml);
+    std::fs::write(&xml, &exported.xml).unwrap();
+    let theirs = scene_of(&xml, define);
+    (ours, exported, theirs)
+}
+
+/// `spp` is a parameter of the file for both; all else of `render` comes back beside it.
+#[test]
+fn the_parameter_of_the_file_says_how_many_samples_are_taken() {
+    for (render, samples) in [
+        ("", 64),
+        ("render: {seed: 3, samples: 16, tile: 16}", 16),
+        ("render: {samples: 16, stop: {samples: 5}}", 5),
+        ("render: {samples: 16, stop: {samples: 5, error: 0.1}}", 5),
+    ] {
+        let scene = ball(render);
+        let (ours, exported, theirs) = there_and_back(&scene, &[]);
+        assert_eq!(ours.render.most_samples(), samples);
+        assert_eq!(theirs.render.most_samples(), samples, "{}", exported.xml);
+        assert_eq!((ours.render.seed, ours.render.tile), (theirs.render.seed, theirs.render.tile));
+        assert_eq!(ours.render.stop.error, theirs.render.stop.error);
+        let (_, exported, other) = there_and_back(&scene, &[("spp", "3")]);
+        assert_eq!(other.render.samples, 3, "{}", exported.xml);
+        if ours.render.stop.error.is_none() {
+            assert_eq!(other.render.most_samples(), 3, "{}", exported.xml);
+        }
+    }
+}
