@@ -57,3 +57,29 @@ fn the_parameter_of_the_file_says_how_many_samples_are_taken() {
         }
     }
 }
+
+/// Mitsuba wants a near plane above 0, a far one beyond it, and of both what 32-bit floats hold; with 1e-4 scenes of a tenth of a
+/// millimetre are cut, and with 1e8 those of the size of planets.
+#[test]
+fn a_camera_sees_there_from_where_to_where_it_sees_here() {
+    for (clip, near, far, is_exact) in [
+        ("", "0.000000000001", "1000000000000000019884624838656", false),
+        ("{near: 0, far: 1}", "0.000000000001", "1", false),
+        ("{near: 0, far: 2e-11}", "0.00000000000002", "0.00000000002", false),
+        ("{near: 0.25}", "0.25", "1000000000000000019884624838656", false),
+        ("{near: 1, far: 1e9}", "1", "1000000000", true),
+        ("{near: 1, far: 1e50}", "1", "1000000000000000019884624838656", false),
+    ] {
+        let clip = if clip.is_empty() { String::new() } else { format!(", clip: {clip}") };
+        for more in ["fov_deg: 40", "orthographic_height: 2"] {
+            let camera = format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], {more}{clip}}}");
+            let (ours, exported, theirs) = there_and_back(&ball(&camera), &[]);
+            assert_eq!(ours.camera.clip, theirs.camera.clip, "{}", exported.xml);
+            for (name, value) in [("near_clip", near), ("far_clip", far)] {
+                let said = format!("<float name=\"{name}\" value=\"{value}\"/>");
+                assert!(exported.xml.contains(&said), "{said}: {}", exported.xml);
+            }
+            assert_eq!(exported.xml.contains("set camera.clip"), !is_exact, "{}", exported.xml);
+        }
+    }
+}

@@ -8,6 +8,12 @@ use super::super::super::node::{Node, Value};
 use super::spectra::can_be_band;
 use super::{Export, FILM, xml};
 
+/// Where Mitsuba's camera begins to see at the nearest, metres. Its pictures are those of 1e-4 to the seventh digit; at 1e-20, whose square
+/// 32-bit floats do not hold, one with a perspective sees nothing.
+const NEAR: f64 = 1e-12;
+/// Where it ends at the farthest, metres. Pictures are those of 1e8; to 3e38 an orthographic one sees nothing.
+const FAR: f64 = 1e30;
+
 impl<'a> Export<'a> {
     pub(super) fn sensor(&mut self) {
         let Camera { pose: _, projection, lens, clip: _, principal_point, shutter: _ } = &self.scene.camera;
@@ -98,11 +104,7 @@ impl<'a> Export<'a> {
 
     /// From where to where the camera sees.
     fn clip(&mut self) {
-        let Camera { pose, projection, clip, .. } = &self.scene.camera;
-        if *clip == Clip::default() {
-            // Theirs always ends somewhere.
-            self.xml.instruction("set camera.clip: {near: 0}");
-        }
+        let Camera { pose, projection, clip: Clip { near, far }, .. } = &self.scene.camera;
         // As an import has it.
         let scale = match (pose, projection) {
             (Pose::ToWorld(rows), Projection::Orthographic { .. }) => {
@@ -110,9 +112,17 @@ impl<'a> Export<'a> {
             }
             _ => 1.0,
         };
-        let begin = clip.near / scale;
-        self.xml.value("float", "near_clip", if begin > 0.0 { begin } else { 1e-4 });
-        self.xml.value("float", "far_clip", (clip.far - (clip.near - begin)).min(1e8));
+        let begin = near / scale;
+        let end = (far - (near - begin)).min(FAR);
+        if begin < NEAR || *far > FAR {
+            // Theirs always begins and ends somewhere.
+            let number = |value: f64| self.yaml(&Node::new(self.root.place, Value::Float(value)));
+            let far = if far.is_finite() { format!(", far: {}", number(*far)) } else { String::new() };
+            let near = number(*near);
+            self.xml.instruction(&format!("set camera.clip: {{near: {near}{far}}}"));
+        }
+        self.xml.value("float", "near_clip", begin.max(NEAR.min(1e-3 * end)));
+        self.xml.value("float", "far_clip", end);
     }
 
     fn film(&mut self) {
