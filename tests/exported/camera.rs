@@ -1,6 +1,6 @@
 //! The camera, its film and the samples that it takes.
 
-use super::{Folder, exported};
+use super::{Folder, exported, told};
 use abbe::batch::{self, Overrides};
 use abbe::description::{Exported, SceneDescription};
 use std::path::Path;
@@ -81,5 +81,46 @@ fn a_camera_sees_there_from_where_to_where_it_sees_here() {
             }
             assert_eq!(exported.xml.contains("set camera.clip"), !is_exact, "{}", exported.xml);
         }
+    }
+}
+
+/// A channel of Mitsuba's `specfilm` is a parameter of it, and `W` its weights: it refuses a second one. What has no name is `_arg_0`.
+#[test]
+fn bands_that_are_called_as_what_the_film_has_are_called_otherwise_there() {
+    let names = ["height", "W", "band W", "_arg_0", "sample_border", "compensate", "size", "R"];
+    let there =
+        ["band height", "band band W", "band W", "band _arg_0", "band sample_border", "band compensate", "size", "R"];
+    let bands = names.map(|name| format!("{{name: {name}, response: {{table: [[400, 1], [500, 0.5]]}}}}")).join(", ");
+    let (ours, exported, theirs) = there_and_back(&ball(&format!("image: {{bands: [{bands}]}}")), &[]);
+    let called = |scene: &SceneDescription| scene.image.bands.iter().map(|band| band.name.clone()).collect::<Vec<_>>();
+    assert_eq!(called(&ours), names);
+    assert_eq!(called(&theirs), names, "{}", exported.xml);
+    let mut losses = Vec::new();
+    for (i, (name, there)) in names.iter().zip(there).enumerate() {
+        assert!(
+            exported.xml.contains(&format!("<spectrum name=\"{there}\" value=\"400:1, 500:0.5\"/>")),
+            "{}",
+            exported.xml
+        );
+        if *name != there {
+            losses.push(format!("image.bands[{i}].name: {there:?}: Mitsuba's film has another use for this name"));
+        }
+    }
+    assert_eq!(told(&exported), losses);
+}
+
+/// The words are the same; to read them back is to read the instruction.
+#[test]
+fn pixels_hold_there_what_they_hold_here() {
+    for channels in ["rgba", "rgb", "xyza", "xyz", "luminance_alpha", "luminance"] {
+        let (ours, exported, theirs) =
+            there_and_back(&ball(&format!("output: {{exr: {{channels: {channels}}}}}")), &[]);
+        assert!(
+            exported.xml.contains(&format!("<string name=\"pixel_format\" value=\"{channels}\"/>")),
+            "{}",
+            exported.xml
+        );
+        assert_eq!(ours.output, theirs.output);
+        assert_eq!(exported.losses, []);
     }
 }

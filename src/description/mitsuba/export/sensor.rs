@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::super::super::camera::{Camera, Clip, FovAxis, Lens, Pose, Projection};
 use super::super::super::image::{Band, Filter, Image};
 use super::super::super::node::{Node, Value};
+use super::super::super::output::Channels;
 use super::spectra::can_be_band;
 use super::{Export, FILM, xml};
 
@@ -13,6 +14,20 @@ use super::{Export, FILM, xml};
 const NEAR: f64 = 1e-12;
 /// Where it ends at the farthest, metres. Pictures are those of 1e8; to 3e38 an orthographic one sees nothing.
 const FAR: f64 = 1e30;
+
+/// What a `specfilm` has another use for than as the name of a band, there or here: its weights and its own parameters.
+const OF_THE_FILM: [&str; 10] = [
+    "W",
+    "width",
+    "height",
+    "crop_offset_x",
+    "crop_offset_y",
+    "crop_width",
+    "crop_height",
+    "sample_border",
+    "component_format",
+    "compensate",
+];
 
 impl<'a> Export<'a> {
     pub(super) fn sensor(&mut self) {
@@ -137,11 +152,12 @@ impl<'a> Export<'a> {
             self.xml.value("integer", "crop_width", crop.width);
             self.xml.value("integer", "crop_height", crop.height);
         }
-        for band in bands {
-            self.band(&band.name, &band.response);
+        for (i, band) in bands.iter().enumerate() {
+            let name = self.band_name(i, bands);
+            self.band(&name, &band.response);
         }
         if bands.is_empty() {
-            self.xml.value("string", "pixel_format", "rgba");
+            self.xml.value("string", "pixel_format", pixel_format(self.scene.output.exr.channels));
         }
         self.xml.value("string", "component_format", "float32");
         if *sample_border {
@@ -163,6 +179,23 @@ impl<'a> Export<'a> {
             self.xml.instruction(&format!("set image.bands: {yaml}"));
         }
         &[]
+    }
+
+    /// The name of a band there. As `_arg_0` Mitsuba knows what has no name.
+    fn band_name(&mut self, i: usize, bands: &[Band]) -> String {
+        let name = &bands[i].name;
+        if !OF_THE_FILM.contains(&name.as_str()) && !name.starts_with("_arg_") {
+            return name.clone();
+        }
+        let mut theirs = format!("band {name}");
+        while bands.iter().any(|band| band.name == theirs) {
+            theirs = format!("band {theirs}");
+        }
+        let field = format!("image.bands[{i}].name");
+        self.lose(&field, format!("{theirs:?}: Mitsuba's film has another use for this name"));
+        let yaml = self.yaml(&Node::new(self.root.place, Value::Text(name.clone())));
+        self.xml.instruction(&format!("set {field}: {yaml}"));
+        theirs
     }
 
     fn filter(&mut self, filter: Filter) {
@@ -187,6 +220,18 @@ impl<'a> Export<'a> {
             }
         }
         self.xml.close();
+    }
+}
+
+/// Mitsuba's word for what a pixel holds, which is ours.
+fn pixel_format(channels: Channels) -> &'static str {
+    match channels {
+        Channels::Rgba => "rgba",
+        Channels::Rgb => "rgb",
+        Channels::Xyza => "xyza",
+        Channels::Xyz => "xyz",
+        Channels::LuminanceAlpha => "luminance_alpha",
+        Channels::Luminance => "luminance",
     }
 }
 
