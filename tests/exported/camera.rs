@@ -1,8 +1,8 @@
-//! The camera, its film and the samples that it takes.
+//! The camera, its film, and what is taken with it.
 
 use super::{Folder, exported, told};
 use abbe::batch::{self, Overrides};
-use abbe::description::{Exported, SceneDescription};
+use abbe::description::{Exported, Integrator, SceneDescription};
 use std::path::Path;
 
 /// A ball under an even sky, and `more`.
@@ -123,4 +123,24 @@ fn pixels_hold_there_what_they_hold_here() {
         assert_eq!(ours.output, theirs.output);
         assert_eq!(exported.losses, []);
     }
+}
+
+/// Mitsuba 3.9.1's `volpath` without depth has an empty picture, but alpha 1 where lamps that are not hidden are around it. Layers are
+/// told.
+#[test]
+fn a_picture_of_nothing_is_one_there() {
+    for more in ["", "media: {smoke: {homogeneous: {scattering: 1}}}\n"] {
+        let scene = ball(more).replace("{path: {opaque_sky: true}}", "none");
+        let (ours, exported, theirs) = there_and_back(&scene, &[]);
+        assert!(matches!(ours.integrator, Integrator::None(_)));
+        assert_eq!(ours.integrator, theirs.integrator, "{}", exported.xml);
+        assert_eq!(exported.losses, []);
+        for said in ["type=\"volpath\"", "name=\"max_depth\" value=\"0\"", "name=\"hide_emitters\" value=\"true\""] {
+            assert!(exported.xml.contains(said), "{said}: {}", exported.xml);
+        }
+    }
+    let layers = "layers: [{name: nn, surface: shading_normal}, {name: d, light: {path: {max_depth: 2}}}]";
+    let (ours, exported, theirs) = there_and_back(&ball(layers), &[]);
+    assert_eq!(told(&exported), ["layers: the picture alone: layers are not written for Mitsuba"]);
+    assert_eq!(ours.layers, theirs.layers);
 }

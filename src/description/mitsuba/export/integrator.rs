@@ -31,20 +31,21 @@ impl Export<'_> {
                 }
                 (plugin, path.max_depth, path.roulette_depth, path.hide_emitters)
             }
-            other => {
-                let (tag, what) = match other {
-                    Integrator::Whitted(_) => ("whitted", "a path tracer: Mitsuba has no Whitted ray tracer"),
-                    Integrator::LightTracer(_) => ("light_tracer", "a path tracer: Mitsuba's ptracer sees no media"),
-                    _ => ("", "a path tracer"),
-                };
-                let field = if tag.is_empty() { "integrator".to_owned() } else { format!("integrator.{tag}") };
-                self.lose(&field, what);
-                let yaml = self.root.get("integrator").map(|node| self.yaml(node)).unwrap_or_default();
-                self.xml.instruction(&format!("instead integrator: {yaml}"));
-                self.xml.open("integrator", &[("type", plugin)]);
+            // Alpha would be 1 where light from infinity is not hidden.
+            Integrator::None(_) => {
+                self.xml.open("integrator", &[("type", "volpath")]);
+                self.xml.value("integer", "max_depth", 0);
+                self.xml.value("boolean", "hide_emitters", true);
                 self.xml.close();
-                self.end();
                 return;
+            }
+            Integrator::Whitted(_) => {
+                let what = "a path tracer: Mitsuba has no Whitted ray tracer";
+                return self.path_tracer(plugin, "integrator.whitted", what);
+            }
+            Integrator::LightTracer(_) => {
+                let what = "a path tracer: Mitsuba's ptracer sees no media";
+                return self.path_tracer(plugin, "integrator.light_tracer", what);
             }
         };
         self.xml.open("integrator", &[("type", plugin)]);
@@ -80,6 +81,16 @@ impl Export<'_> {
             }
             _ => {}
         }
+    }
+
+    /// A path tracer for what Mitsuba does not have.
+    fn path_tracer(&mut self, plugin: &str, field: &str, what: &str) {
+        self.lose(field, what);
+        let yaml = self.root.get("integrator").map(|node| self.yaml(node)).unwrap_or_default();
+        self.xml.instruction(&format!("instead integrator: {yaml}"));
+        self.xml.open("integrator", &[("type", plugin)]);
+        self.xml.close();
+        self.end();
     }
 
     /// Says which light Mitsuba's integrators do not know.

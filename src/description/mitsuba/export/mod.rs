@@ -233,10 +233,13 @@ impl<'a> Export<'a> {
             if let Some(node) = self.root.get(key) {
                 let yaml = self.yaml(node);
                 self.xml.instruction(&format!("set {key}: {yaml}"));
-                if key == "fog" {
-                    self.lose("fog", "nothing: Mitsuba has no fog by depth");
-                }
             }
+        }
+        if self.scene.fog.is_some() {
+            self.lose("fog", "nothing: Mitsuba has no fog by depth");
+        }
+        if !self.scene.layers.is_empty() {
+            self.lose("layers", "the picture alone: layers are not written for Mitsuba");
         }
         self.render();
         self.integrator();
