@@ -2,6 +2,40 @@
 
 use super::exported_with;
 
+/// Where no lamp is looked for Mitsuba 3.9.1 finds "no probability mass" and renders nothing: it looks for all, which is told.
+#[test]
+fn a_scene_in_which_no_lamp_is_looked_for_is_one_of_mitsubas() {
+    let lights = |weight: u32| {
+        format!(
+            "lights: [{{point: {{position: [1, 3, 1], intensity: 5, sampling_weight: 0}}}}, \
+             {{constant: {{radiance: 0.3, sampling_weight: {weight}}}}}, {{constant: {{radiance: 0.1}}}}]\n"
+        )
+    };
+    let disk = "disk: {center: [-1, 1.5, 0], normal: [0, -1, 0], radius: 0.5, emission: 3, sampling_weight: 0}";
+    let second = "lights[2]: nothing: Mitsuba has one environment".to_owned();
+    let (losses, xml) = exported_with(&lights(0), disk);
+    let lamps = ["shapes[1].disk", "lights[0].point", "lights[1].constant"];
+    let told =
+        lamps.map(|lamp| format!("{lamp}.sampling_weight: 1: Mitsuba wants one lamp at least that it looks for"));
+    assert_eq!(losses, [&told[..], &[second.clone()]].concat());
+    assert!(!xml.contains("name=\"sampling_weight\""), "{xml}");
+    let (losses, xml) = exported_with(&lights(2), disk);
+    assert_eq!(losses, [second]);
+    assert_eq!(xml.matches("name=\"sampling_weight\" value=\"0\"").count(), 2, "{xml}");
+}
+
+/// 1 − cos of half its angle is 0 in single precision, by which Mitsuba 3.9.1 divides: no pixel is a number.
+#[test]
+fn a_sun_that_is_too_narrow_for_mitsuba_is_wider_there() {
+    for (angle, there, is_told) in [(0.001, 0.05, true), (0.05, 0.05, false), (0.5, 0.5, false)] {
+        let head = format!("lights: [sky: {{sun: {{elevation_deg: 40}}, sun_angle_deg: {angle}}}]\n");
+        let (losses, xml) = exported_with(&head, "sphere: {radius: 0.3}");
+        let told = ["lights[0]: a sun of 0.05 degrees, as bright: narrower ones are none for Mitsuba"];
+        assert_eq!(losses, if is_told { &told[..] } else { &[] });
+        assert!(xml.contains(&format!("<float name=\"sun_aperture\" value=\"{there}\"/>")), "{xml}");
+    }
+}
+
 /// A slide hangs upside down for Mitsuba and is written again; what that cannot say is told of the light, too, whose own words
 /// bring it back.
 #[test]

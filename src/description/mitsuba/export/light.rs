@@ -15,6 +15,10 @@ use super::textures::Stands;
 use super::xml::numbers;
 use super::{DAYLIGHT, Export, SKY_FROM_MITSUBA, joined};
 
+/// The angle of the narrowest disc of a sun that Mitsuba gets: it divides by 1 − cos of its half in single precision, which is 0 below
+/// 0.028 degrees, so that nothing of the picture is a number.
+const NARROWEST_SUN_DEG: f64 = 0.05;
+
 impl Export<'_> {
     /// A light of the scene's list.
     pub(super) fn light(&mut self, i: usize, light: &Light) {
@@ -42,7 +46,8 @@ impl Export<'_> {
             None => {}
         }
         self.emitter(light, &skies);
-        self.weight(if is_sum { skies.iter().map(|sky| sky.sampling_weight).sum() } else { light.sampling_weight() });
+        let weight = if is_sum { skies.iter().map(|sky| sky.sampling_weight).sum() } else { light.sampling_weight() };
+        self.weight(&format!("lights[{i}].{}", light.kind()), weight);
         self.xml.close();
         if why.is_some() || reads_otherwise {
             self.end();
@@ -67,7 +72,12 @@ impl Export<'_> {
                     .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned());
                 joined([shifted, self.spectra(&l.file).map(str::to_owned)])
             }
-            Light::Sky(l) => Export::reflectance_shortfall(&[&l.albedo], "a grey ground").map(str::to_owned),
+            Light::Sky(l) => {
+                let narrow = (l.sun_angle_deg < NARROWEST_SUN_DEG).then(|| {
+                    format!("a sun of {NARROWEST_SUN_DEG} degrees, as bright: narrower ones are none for Mitsuba")
+                });
+                joined([Export::reflectance_shortfall(&[&l.albedo], "a grey ground").map(str::to_owned), narrow])
+            }
             Light::Projector(l) => self.shining_shortfall(&l.irradiance, stands(l.v)),
         }
     }
@@ -132,7 +142,7 @@ impl Export<'_> {
                 let sum = |scale: fn(&SkyLight) -> f64| skies.iter().map(|sky| scale(sky)).sum::<f64>();
                 self.xml.value("float", "sky_scale", sum(|sky| sky.sky_scale));
                 self.xml.value("float", "sun_scale", sum(|sky| sky.sun_scale));
-                self.xml.value("float", "sun_aperture", l.sun_angle_deg);
+                self.xml.value("float", "sun_aperture", l.sun_angle_deg.max(NARROWEST_SUN_DEG));
                 self.xml.value("boolean", "complex_sun", l.limb_darkening);
                 self.placing(DMat4::from_mat3(world_from_sky * SKY_FROM_MITSUBA));
             }
@@ -162,8 +172,8 @@ impl Export<'_> {
         self.xml.close();
     }
 
-    /// The emission of a shape.
-    pub(super) fn area(&mut self, shape: &Shape, emission: &SpectrumOrTexture) {
+    /// The emission of the shape `field`.
+    pub(super) fn area(&mut self, field: &str, shape: &Shape, emission: &SpectrumOrTexture) {
         let plugin = match shape.emission_direction {
             Some(EmissionDirection::Normal) => "directionalarea",
             Some(EmissionDirection::All) | None => "area",
@@ -173,7 +183,7 @@ impl Export<'_> {
             Some(_) => self.xml.value("spectrum", "radiance", 1),
             None => self.shining("radiance", emission, Stands::Upright),
         }
-        self.weight(shape.sampling_weight.unwrap_or(1.0));
+        self.weight(field, shape.sampling_weight.unwrap_or(1.0));
         self.xml.close();
     }
 
@@ -192,10 +202,29 @@ impl Export<'_> {
         is_bare.then_some("an even radiance of 1: Mitsuba wants texture coordinates of a mesh that shines by a texture")
     }
 
-    fn weight(&mut self, weight: f64) {
-        if weight != 1.0 {
+    /// How often the lamp `field` is looked for.
+    fn weight(&mut self, field: &str, weight: f64) {
+        if self.looks_for_none() {
+            let field = format!("{field}.sampling_weight");
+            self.lose(&field, "1: Mitsuba wants one lamp at least that it looks for");
+            self.xml.instruction(&format!("set {field}: 0"));
+        } else if weight != 1.0 {
             self.xml.value("float", "sampling_weight", weight);
         }
+    }
+
+    /// Whether none of the lamps that Mitsuba gets is looked for.
+    fn looks_for_none(&self) -> bool {
+        let shapes = self.scene.shapes.iter().filter(|shape| shape.emission.is_some());
+        let of_shapes = shapes.map(|shape| shape.sampling_weight.unwrap_or(1.0));
+        // Of those around the scene it gets the first, and what is like it.
+        let first = self.scene.lights.iter().find(|light| light.is_around());
+        let is_there = |light: &&Light| {
+            let is_first = |first: &Light| std::ptr::eq(first, *light) || sky_like(first, light).is_some();
+            !light.is_around() || first.is_some_and(is_first)
+        };
+        let of_lights = self.scene.lights.iter().filter(is_there).map(Light::sampling_weight);
+        of_shapes.chain(of_lights).all(|weight| weight == 0.0)
     }
 
     /// What shines, as a spectrum or as a picture that is light of its illuminant.

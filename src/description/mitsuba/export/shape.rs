@@ -202,7 +202,7 @@ impl Export<'_> {
         }
         self.material_ref(&format!("{field}.material"), &shape.material);
         if let Some(emission) = &shape.emission {
-            self.area(shape, emission);
+            self.area(field, shape, emission);
         }
         let keys = if self.has_crossed_media(shape) { ["exterior", "interior"] } else { ["interior", "exterior"] };
         for (key, medium) in keys.into_iter().zip(self.sides(shape).map(|side| side.map(str::to_owned))) {
