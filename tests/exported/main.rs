@@ -539,16 +539,18 @@ fn lamps_keep_their_names_and_pictures_their_alpha() {
 }
 
 /// A picture on a plane repeats by the metre along the tangent for Mitsuba, too, which reads none of our instructions, and turns with
-/// it; a plane that is mirrored keeps its front. What else has no texture coordinates there, or others, is told.
+/// it; a plane that is mirrored keeps its front. One on a tube begins at the seam. What else has no texture coordinates there, or
+/// others, is told.
 #[test]
-fn pictures_on_planes_stay_where_they_are() {
+fn pictures_on_planes_and_tubes_stay_where_they_are() {
     let folder = Folder::new();
     let scene = |more: &str| {
         format!(
             "camera: {{origin: [0.3, 2, 4], target: [0.2, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{max_depth: 2}}}}\n\
              image: {{width: 24, height: 16}}\nrender: {{samples: 8}}\n\
-             textures: {{board: {{checkerboard: {{a: 0.1, b: 0.8}}}}}}\n\
-             materials: {{tiles: {{diffuse: {{reflectance: {{texture: board}}}}}}, one: {{two_sided: {{front: tiles, back: {{diffuse: {{reflectance: 0}}}}}}}}}}\n\
+             textures: {{board: {{checkerboard: {{a: 0.1, b: 0.8}}}}, small: {{checkerboard: {{a: 0.1, b: 0.8, scale: [7, 5]}}}}}}\n\
+             materials: {{tiles: {{diffuse: {{reflectance: {{texture: board}}}}}}, squares: {{diffuse: {{reflectance: {{texture: small}}}}}}, \
+             one: {{two_sided: {{front: tiles, back: {{diffuse: {{reflectance: 0}}}}}}}}}}\n\
              shapes:\n{more}lights: [point: {{position: [1, 3, 2], intensity: 5}}]\n"
         )
     };
@@ -557,6 +559,11 @@ fn pictures_on_planes_stay_where_they_are() {
         "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], tangent: [3, 0, 1], material: one, transform: [scale: [-0.7, 1, 0.5]]}\n",
         "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], material: tiles, transform: [rotate: {axis: [0, 1, 0], deg: 30}]}\n",
         "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], material: {two_sided: {front: {diffuse: {}}, back: {diffuse: {reflectance: 0}}}}, transform: [scale: [-1, 1, 1]]}\n",
+        "- cylinder: {base: [0, 1, 0], top: [0.3, -0.8, 0.1], radius: 0.9, caps: none, material: squares}\n",
+        "- cylinder: {base: [0, -0.8, 0], top: [0.3, 0.8, 0.1], radius: 0.7, caps: none, seam: [0.2, 0.3, 1], material: squares, \
+         transform: [{scale: 1.2}, {rotate: {axis: [1, 2, 3], deg: 40}}]}\n",
+        "- cylinder: {base: [0, -0.8, 0], top: [0.3, 0.8, 0.1], radius: 0.8, caps: none, seam: [1, 0, 1], material: squares, \
+         transform: [scale: [-1, 1, 1]]}\n",
     ];
     for plane in planes {
         folder.write(&scene(plane));

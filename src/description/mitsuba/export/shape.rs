@@ -63,29 +63,7 @@ impl Export<'_> {
                 self.xml.value("float", "radius", sphere.radius);
                 self.placing(world);
             }
-            Geometry::Cylinder(cylinder) => {
-                for (cap, at, from) in
-                    [(Caps::Base, cylinder.base, cylinder.top), (Caps::Top, cylinder.top, cylinder.base)]
-                {
-                    if cylinder.caps == Caps::Both || cylinder.caps == cap {
-                        let outward = DVec3::from(at) - DVec3::from(from);
-                        self.xml.open("shape", &[("type", "disk")]);
-                        self.placing(world * placed(at.into(), outward, cylinder.radius));
-                        self.surface(field, shape);
-                        self.xml.close();
-                    }
-                }
-                self.open("cylinder", shape);
-                let (place, scale, rest) = match self.mirrored_tube(shape) {
-                    Some(scale) => (world, scale, DMat4::IDENTITY),
-                    None => (DMat4::IDENTITY, 1.0, world),
-                };
-                for (key, end) in [("p0", cylinder.base), ("p1", cylinder.top)] {
-                    self.xml.value("point", key, numbers(&place.transform_point3(end.into()).to_array()));
-                }
-                self.xml.value("float", "radius", cylinder.radius * scale);
-                self.placing(rest);
-            }
+            Geometry::Cylinder(cylinder) => self.cylinder(field, shape, cylinder),
             Geometry::Cone(cone) => {
                 self.open("ply", shape);
                 let name = self.mesh(cone_mesh(cone).into_bytes());
@@ -170,6 +148,33 @@ impl Export<'_> {
         }
     }
 
+    /// The same of a cylinder.
+    fn cylinder(&mut self, field: &str, shape: &Shape, cylinder: &Cylinder) {
+        let world = shape.world_from_object();
+        for (cap, at, from) in [(Caps::Base, cylinder.base, cylinder.top), (Caps::Top, cylinder.top, cylinder.base)] {
+            if cylinder.caps == Caps::Both || cylinder.caps == cap {
+                let outward = DVec3::from(at) - DVec3::from(from);
+                self.xml.open("shape", &[("type", "disk")]);
+                self.placing(world * placed(at.into(), outward, cylinder.radius));
+                self.surface(field, shape);
+                self.xml.close();
+            }
+        }
+        self.open("cylinder", shape);
+        if let Some(tube) = self.turned_tube(shape) {
+            return self.placing(world * tube);
+        }
+        let (place, scale, rest) = match self.mirrored_tube(shape) {
+            Some(scale) => (world, scale, DMat4::IDENTITY),
+            None => (DMat4::IDENTITY, 1.0, world),
+        };
+        for (key, end) in [("p0", cylinder.base), ("p1", cylinder.top)] {
+            self.xml.value("point", key, numbers(&place.transform_point3(end.into()).to_array()));
+        }
+        self.xml.value("float", "radius", cylinder.radius * scale);
+        self.placing(rest);
+    }
+
     /// How coordinates run on a shape, where ours do otherwise than Mitsuba's.
     fn coordinates(&mut self, field: &str, shape: &Shape) {
         match &shape.geometry {
@@ -221,6 +226,17 @@ impl Export<'_> {
         (mirrored && !self.is_textured(shape) && is_similarity(linear)).then(|| linear.x_axis.length())
     }
 
+    /// The unit tube along z, where u begins at x, as a tube with a picture that begins elsewhere than Mitsuba has it by the ends alone.
+    fn turned_tube(&self, shape: &Shape) -> Option<DMat4> {
+        let Geometry::Cylinder(cylinder) = &shape.geometry else { return None };
+        let seam = seam(cylinder).filter(|_| self.is_textured(shape))?;
+        let base = DVec3::from(cylinder.base);
+        let along = DVec3::from(cylinder.top) - base;
+        let Frame { s, t, .. } = Frame::from_normal_and_tangent(along.normalize_or_zero(), seam);
+        let columns = DMat3::from_cols(s * cylinder.radius, t * cylinder.radius, along);
+        Some(DAffine3 { matrix3: columns, translation: base }.into())
+    }
+
     /// Whether a shape stands in the file as it was written, too.
     pub(super) fn is_restated(&self, shape: &Shape) -> bool {
         self.shape_shortfall(shape).is_some() || self.reads_otherwise(shape)
@@ -232,7 +248,7 @@ impl Export<'_> {
         let mirrored = is_mirror(shape.world_from_object());
         let turned = matches!(&shape.geometry, Geometry::Mesh(mesh) if self.is_turned(mesh, mirrored));
         let anew = matches!(&shape.geometry, Geometry::Mesh(mesh) if (self.anew)(&mesh.file, mesh.index).is_some());
-        let tube = self.mirrored_tube(shape).is_some();
+        let tube = self.mirrored_tube(shape).is_some() || self.turned_tube(shape).is_some();
         let filled = self.absorbs(&shape.material) && self.sides(shape).into_iter().flatten().any(is_medium);
         turned || anew || tube || filled || self.has_crossed_media(shape)
     }
@@ -297,11 +313,10 @@ impl Export<'_> {
             Geometry::Sphere(Sphere { layout: Layout::ZUp, .. }) | Geometry::Cube(Cube { layout: Layout::ZUp, .. }) => {
                 None
             }
-            // The coordinates of a disk are Mitsuba's, and those of a tube whose seam is where Mitsuba has it.
-            Geometry::Cylinder(cylinder) if textured && seam(cylinder).is_none() => None,
-            Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Cube(_) if textured => {
+            Geometry::Sphere(_) | Geometry::Cube(_) if textured => {
                 said("the same shape with Mitsuba's texture coordinates")
             }
+            // The coordinates of a disk are Mitsuba's, and those of a tube are where its seam is.
             Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) => None,
             Geometry::Mesh(mesh) if textured && mesh.flip_v && mesh_plugin(&mesh.file) == "serialized" => {
                 said("the same mesh, its textures upside down")
