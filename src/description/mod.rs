@@ -548,7 +548,9 @@ pub use output::{
 };
 pub(crate) use path::field;
 pub use path_map::PathMap;
-pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
+pub use principled::{
+    Contrast, Luminance, MOST_CROSSING, MOST_STRENGTH, Principled, PrincipledThin, Sampling, ThinSampling,
+};
 pub use print::yaml;
 pub use scene::{DEFAULT_GROUP, Locator, SceneDescription};
 pub use settings::{

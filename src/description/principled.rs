@@ -68,7 +68,10 @@ pub enum Luminance {
 const RATES: [f64; 2] = [1e-6, 1e6];
 
 /// The strongest sheen and clearcoat, which add to the light that comes back; as they are meant, they go up to 1.
-const MOST_STRENGTH: f64 = 10.0;
+pub const MOST_STRENGTH: f64 = 10.0;
+
+/// Of the diffuse light of a sheet, all.
+pub const MOST_CROSSING: f64 = 2.0;
 
 /// Factors on how often the lobes of a [`Principled`] are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -275,7 +278,7 @@ impl PrincipledThin {
             ("roughness", &self.roughness, 1.0),
             ("anisotropic", &self.anisotropic, 1.0),
             ("spec_trans", &self.spec_trans, 1.0),
-            ("diff_trans", &self.diff_trans, 2.0),
+            ("diff_trans", &self.diff_trans, MOST_CROSSING),
             ("spec_tint", &self.spec_tint, 1.0),
             ("sheen", &self.sheen, MOST_STRENGTH),
             ("sheen_tint", &self.sheen_tint, 1.0),

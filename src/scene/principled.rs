@@ -77,12 +77,12 @@ pub struct Solid {
     pub rates: Rates,
 }
 
-/// A share from 0 to 1: a texel beyond is clamped.
+/// A share from 0 to 1. Textures beyond are refused: what is cut is the rounding of what lies between their numbers.
 fn share(s: &Scalar, at: &TexturePoint) -> f32 {
     s.eval(at).clamp(0.0, 1.0) as f32
 }
 
-/// A number of zero or more.
+/// A number of zero or more, likewise.
 fn strength(s: &Scalar, at: &TexturePoint) -> f32 {
     s.eval(at).max(0.0) as f32
 }

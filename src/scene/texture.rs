@@ -2,8 +2,8 @@
 
 mod numbers;
 
-pub(super) use numbers::luminance;
 pub use numbers::{DataImage, Numbers, Scalar};
+pub(super) use numbers::{luminance, outside};
 
 use super::SurfacePoint;
 use super::bands::Bands;

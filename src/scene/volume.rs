@@ -12,11 +12,12 @@ mod bounds;
 
 pub use bounds::{Bounds, March, Stretch};
 
-use super::texture::{Wrap, even_shares, mean_luminance, spread};
+use super::texture::{Wrap, even_shares, mean_luminance, outside, spread};
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 use std::sync::{Arc, OnceLock};
 
 /// A spectrum at every point of space.
@@ -259,6 +260,15 @@ impl GridVolume {
         (0..self.len()).map(greatest).fold(0.0, f32::max)
     }
 
+    fn outside(&self, bounds: &RangeInclusive<f64>) -> Option<f64> {
+        match &self.values {
+            Voxels::Grey(values) => values.iter().find_map(|&x| outside([x; 3], 1.0, bounds)),
+            Voxels::Raw(values) => values.iter().find_map(|&rgb| outside(rgb, 1.0, bounds)),
+            // As for `scalar`.
+            Voxels::Coloured(_) => None,
+        }
+    }
+
     fn spectrum(&self, i: usize) -> Spectrum {
         match &self.values {
             Voxels::Grey(values) => Spectrum::constant(f64::from(values[i])),
@@ -314,6 +324,15 @@ impl Volume {
             Volume::Constant { value: Spectrum::Constant(value), .. } => f64::from(*value),
             Volume::Constant { value, .. } => (360..=830).map(|nm| value.at(f64::from(nm))).sum::<f64>() / 471.0,
             Volume::Grid(grid) => grid.scalar(point),
+        }
+    }
+
+    /// The first number outside `bounds` that it has.
+    #[must_use]
+    pub fn outside(&self, bounds: &RangeInclusive<f64>) -> Option<f64> {
+        match self {
+            Volume::Constant { .. } => Some(self.scalar(DVec3::ZERO)).filter(|x| !bounds.contains(x)),
+            Volume::Grid(grid) => grid.outside(bounds),
         }
     }
 

@@ -9,9 +9,10 @@
 //! green blue` are the attribute `vertex_color` or `face_color`; whole numbers there count from 0 to the
 //! greatest of their type. An attribute has one number or three; other properties are passed over.
 
-use crate::scene::texture::{TexturePoint, even_shares, luminance, mean_luminance, spread};
+use crate::scene::texture::{TexturePoint, even_shares, luminance, mean_luminance, outside, spread};
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::DVec3;
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -110,6 +111,12 @@ impl AttributeTexture {
     pub fn no_share(&self) -> Option<f32> {
         let mut scaled = self.field.values.iter().flatten().map(|&x| (f64::from(x) * self.scale) as f32);
         scaled.find(|x| !(0.0..=1.0).contains(x))
+    }
+
+    /// The first number outside `bounds` that, by its scale, it has; of three their mean by luminance.
+    #[must_use]
+    pub fn outside(&self, bounds: &RangeInclusive<f64>) -> Option<f64> {
+        self.field.values.iter().find_map(|&rgb| outside(rgb, self.scale, bounds))
     }
 
     /// Some 16 of the spectra and the brightest, for the choice of wavelengths.

@@ -1,10 +1,12 @@
 //! Numbers that vary over a surface: roughness, weights, heights, normals.
 
 use super::{Grid, Interpolation, TexturePoint, same_cell};
+use crate::error::in_short;
 use crate::scene::mesh::attribute::AttributeTexture;
 use crate::scene::volume::Volume;
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use glam::{DAffine2, DVec2, DVec3, Vec3};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// A number at every point of a surface, or three: data such as roughness, weight, height, normal.
@@ -137,11 +139,45 @@ impl Scalar {
         }
     }
 
+    /// In words, the first number outside `bounds` that it has, and of a picture the texel; `None` where all are within.
+    #[must_use]
+    pub fn outside(&self, bounds: &RangeInclusive<f64>) -> Option<String> {
+        match self {
+            Scalar::Uniform(x) => (!bounds.contains(x)).then(|| in_short(*x)),
+            Scalar::Image(DataImage { texels, grid }) => {
+                // Of most pictures of bytes no texel has to be looked at.
+                if let Numbers::Bytes { level, .. } = texels
+                    && level.iter().all(|x| bounds.contains(&f64::from(*x)))
+                {
+                    return None;
+                }
+                (0..grid.width * grid.height).find_map(|i| {
+                    let found = outside(texels.at(i), 1.0, bounds)?;
+                    Some(format!("{} at ({}, {})", in_short(found), i % grid.width, i / grid.width))
+                })
+            }
+            Scalar::Checkerboard { a, b, .. } => a.outside(bounds).or_else(|| b.outside(bounds)),
+            Scalar::Volume(volume) => volume.outside(bounds).map(in_short),
+            Scalar::Attribute(attribute) => attribute.outside(bounds).map(in_short),
+        }
+    }
+
     /// True for anything but one number.
     #[must_use]
     pub fn varies(&self) -> bool {
         !matches!(self, Scalar::Uniform(_))
     }
+}
+
+/// Three numbers as one, times `scale`, if that is outside `bounds`. The mean of numbers within is within, but for its rounding.
+pub(in crate::scene) fn outside(rgb: [f32; 3], scale: f64, bounds: &RangeInclusive<f64>) -> Option<f64> {
+    // Rounded, so that 3 by a third is 1.
+    let scaled = |x: f32| f64::from((f64::from(x) * scale) as f32);
+    let within = |x: f64| bounds.contains(&x);
+    if rgb.into_iter().all(|x| within(scaled(x))) {
+        return None;
+    }
+    Some(scaled(luminance(rgb))).filter(|x| !within(*x))
 }
 
 /// Three numbers as one: their mean by luminance.
