@@ -235,6 +235,7 @@
 //!                                                # ~ scale; metres along the normal; of bilinear pictures, as else
 //!                                                # there are no slopes
 //!   scales: {normal_map: {normals: {texture: earth}, material: clay}}
+//!                                                # of a picture with raw: true, else it is decoded as colours are
 //!                                                # both: turn: true, shadowing: true
 //! media:
 //!   smoke:

@@ -433,7 +433,7 @@ mod tests {
         let texel = [0.8f32, 0.5, 0.9];
         let grid = crate::scene::texture::Grid::new(1, 1);
         let texels = crate::scene::texture::Numbers::Floats(Arc::new(vec![texel]));
-        let normals = Scalar::Image(crate::scene::texture::DataImage { texels, grid });
+        let normals = Scalar::Image(crate::scene::texture::DataImage { texels, grid, decoded: false });
         Relief { form: ReliefForm::Normals(normals), turn: true, shadowing: true }
     }
 

@@ -221,12 +221,12 @@ fn upsampled_bytes(counted: Counted, level: &[f32; 256], carried: Carried) -> Te
 /// # Errors
 /// As [`picture`]; numbers may be negative.
 pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage, Option<String>)> {
-    let mut note = None;
+    let (mut note, mut is_decoded) = (None, false);
     let (texels, width, height): (Vec<[f32; 3]>, usize, usize) = match decoded {
         Decoded::Bytes { rgb, width, height, .. } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
             let texels = Numbers::Bytes { bytes: Arc::new(rgb), level: Box::new(level) };
-            return Ok((DataImage { texels, grid: Grid::new(width, height) }, None));
+            return Ok((DataImage { texels, grid: Grid::new(width, height), decoded: !raw }, None));
         }
         Decoded::Exr(file) => {
             note = cut_out(path, &file);
@@ -241,9 +241,9 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage
             (texels, part.window.width as usize, part.window.height as usize)
         }
         Decoded::Other(decoded) => {
-            let linear = is_linear(&decoded);
+            is_decoded = !(raw || is_linear(&decoded));
             let rgb = decoded.into_rgb32f();
-            let number = |x: f32| if raw || linear { x } else { colour::srgb_decode(x) };
+            let number = |x: f32| if is_decoded { colour::srgb_decode(x) } else { x };
             (rgb.pixels().map(|p| p.0.map(number)).collect(), rgb.width() as usize, rgb.height() as usize)
         }
     };
@@ -251,7 +251,8 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage
         let (x, y) = (i % width, i / width);
         return Err(Error::input(path, format!("expected finite numbers, found {:?} at ({x}, {y})", texels[i])));
     }
-    Ok((DataImage { texels: Numbers::Floats(Arc::new(texels)), grid: Grid::new(width, height) }, note))
+    let texels = Numbers::Floats(Arc::new(texels));
+    Ok((DataImage { texels, grid: Grid::new(width, height), decoded: is_decoded }, note))
 }
 
 #[cfg(test)]

@@ -595,6 +595,7 @@ mod tests {
         Scalar::Image(DataImage {
             texels: Numbers::Floats(Arc::new([0.1, 0.5, 0.3, 0.9].map(|x| [x; 3]).to_vec())),
             grid,
+            decoded: false,
         })
     }
 

@@ -328,6 +328,13 @@ impl<'a> Compiler<'a> {
             }
             written::Material::NormalMap(m) => {
                 let normals = self.named_numbers(&m.normals.texture);
+                if normals.is_decoded() {
+                    self.note(
+                        &at("normals"),
+                        "the picture is decoded from sRGB, as if its numbers were colours, so that normals lean; \
+                         with raw: true they are as they stand",
+                    );
+                }
                 let relief = Relief { form: ReliefForm::Normals(normals), turn: m.turn, shadowing: m.shadowing };
                 let inner = self.inner(&at("material"), &m.material);
                 plain(self.compound(&place, Composition::Relief { relief, inner }))
@@ -562,6 +569,30 @@ mod tests {
         }
         for raised in ["{image: {file: waves.pgm}}", "{checkerboard: {a: 0, b: {texture: waves}}}"] {
             assert!(!told(raised), "{raised}");
+        }
+    }
+
+    /// A blue of 255 and the others of 128 stand for the normal itself; decoded, 128 is 0.216, and the normal leans by 39 degrees.
+    #[test]
+    fn normals_of_a_picture_that_is_not_raw_are_told() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("flat.ppm"), b"P6 1 1 255\n\x80\x80\xff").unwrap();
+        std::fs::write(directory.path().join("flat16.ppm"), b"P6 1 1 65535\n\x80\0\x80\0\xff\xff").unwrap();
+        let told = |texture: &str, material: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 textures:\n  t: {{image: {{{texture}}}}}\n  board: {{checkerboard: {{a: 0.5, b: {{texture: t}}}}}}\n\
+                 materials: {{m: {{{material}}}}}\nshapes: [sphere: {{radius: 1, material: m}}]\n"
+            );
+            let notes = compiled_in(directory.path(), &text).notes;
+            notes.iter().any(|note| note.contains("m.normal_map.normals: the picture is decoded from sRGB"))
+        };
+        let normals =
+            |texture: &str| format!("normal_map: {{normals: {{texture: {texture}}}, material: {{diffuse: {{}}}}}}");
+        for file in ["file: flat.ppm", "file: flat16.ppm"] {
+            assert!(told(file, &normals("t")) && told(file, &normals("board")), "{file}");
+            assert!(!told(&format!("{file}, raw: true"), &normals("t")), "{file}");
+            assert!(!told(file, "diffuse: {reflectance: {texture: t}}"), "{file}");
         }
     }
 

@@ -67,6 +67,8 @@ pub struct DataImage {
     pub texels: Numbers,
     /// Where they lie.
     pub grid: Grid,
+    /// Whether they were decoded from sRGB, as colours are.
+    pub decoded: bool,
 }
 
 impl Scalar {
@@ -139,12 +141,22 @@ impl Scalar {
         }
     }
 
+    /// Whether any of its numbers were decoded from sRGB.
+    #[must_use]
+    pub fn is_decoded(&self) -> bool {
+        match self {
+            Scalar::Uniform(_) | Scalar::Volume(_) | Scalar::Attribute(_) => false,
+            Scalar::Image(image) => image.decoded,
+            Scalar::Checkerboard { a, b, .. } => a.is_decoded() || b.is_decoded(),
+        }
+    }
+
     /// In words, the first number outside `bounds` that it has, and of a picture the texel; `None` where all are within.
     #[must_use]
     pub fn outside(&self, bounds: &RangeInclusive<f64>) -> Option<String> {
         match self {
             Scalar::Uniform(x) => (!bounds.contains(x)).then(|| in_short(*x)),
-            Scalar::Image(DataImage { texels, grid }) => {
+            Scalar::Image(DataImage { texels, grid, .. }) => {
                 // Of most pictures of bytes no texel has to be looked at.
                 if let Numbers::Bytes { level, .. } = texels
                     && level.iter().all(|x| bounds.contains(&f64::from(*x)))
