@@ -166,6 +166,11 @@ impl Import<'_> {
 pub(super) fn transparent(bag: &Bag<'_>, sides: Sides) -> Result<(), Fault> {
     match sides {
         Sides::Front => Ok(()),
-        Sides::Both => Err(bag.fault("expected a surface that lets no light through inside <twosided>")),
+        Sides::Both => {
+            let message = "expected a surface that lets no light through inside <twosided>";
+            // Without it this one lets none through.
+            let is_by_share = bag.object.plugin == "principled";
+            Err(if is_by_share { bag.fault_of("spec_trans", message) } else { bag.fault(message) })
+        }
     }
 }

@@ -142,7 +142,7 @@ impl Import<'_> {
         }
     }
 
-    /// A part of a material that lets light through, whatever its numbers. Materials that were `seen` do not.
+    /// A part of a material that lets light through, whatever its other numbers. Materials that were `seen` do not.
     fn lets_through(&self, index: usize, seen: &mut HashSet<usize>) -> Option<usize> {
         if !seen.insert(index) {
             return None;
@@ -150,15 +150,18 @@ impl Import<'_> {
         let bag = self.bag(index);
         match bag.object.plugin.as_str() {
             "null" | "mask" => Some(index),
-            clear if CLEAR.contains(&clear) => Some(index),
+            _ if self.is_clear(index) => Some(index),
             _ => bag.objects(Family::Bsdf).into_iter().find_map(|inner| self.lets_through(inner, seen)),
         }
     }
 
-    /// Whether a material is one of those that let light through.
+    /// Whether a material is one of those that let light through: `principled` does by its `spec_trans`, unless that is 0.
     fn is_clear(&self, index: usize) -> bool {
-        let plugin = self.document.objects[index].plugin.as_str();
-        CLEAR.contains(&plugin)
+        let bag = self.bag(index);
+        match bag.object.plugin.as_str() {
+            "principled" => !matches!(bag.value("spec_trans"), None | Some(Value::Float(0.0) | Value::Integer(0))),
+            plugin => CLEAR.contains(&plugin),
+        }
     }
 
     /// Whether a material is made of others.
@@ -317,6 +320,17 @@ mod tests {
             assert_eq!(told(&inside, allowed), "none", "{open}");
         }
         assert_eq!(told("<bsdf type=\"diffuse\"/>", ""), "none");
+        let burley = |share: &str| format!("<bsdf type=\"principled\">{share}</bsdf>");
+        for none in ["", "<float name=\"spec_trans\" value=\"0\"/>"] {
+            assert_eq!(told(&burley(none), ""), "none");
+        }
+        let half = "<float name=\"spec_trans\" value=\"0.5\"/>";
+        for some in [half, "<texture type=\"checkerboard\" name=\"spec_trans\"/>"] {
+            let expected =
+                "\"principled\": spec_trans: expected a surface that lets no light through inside <twosided>";
+            assert!(told(&burley(some), "").ends_with(expected), "{}", told(&burley(some), ""));
+        }
+        assert_eq!(told(&burley(half), allowed), "none");
     }
 
     #[test]
