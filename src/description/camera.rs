@@ -272,10 +272,8 @@ impl Pose {
                 let linear = DMat3::from_mat4(matrix);
                 match projection {
                     Projection::Perspective { .. } => {
-                        let similar = is_similarity_but_for(linear, RIGHT_ANGLE_TOLERANCE);
-                        let rigid = similar && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE;
                         let found = "a matrix that scales or shears";
-                        checker.require(rigid, at, "moves, turns and mirrors for a perspective", found);
+                        checker.require(is_rigid(linear), at, "moves, turns and mirrors for a perspective", found);
                     }
                     Projection::Orthographic { .. } => {
                         let lengths =
@@ -298,6 +296,12 @@ const RIGHT_ANGLE_TOLERANCE: f64 = 3e-4;
 
 /// What the volume of a rigid motion, written with four significant digits, may be off by.
 const RIGID_TOLERANCE: f64 = 3e-3;
+
+/// Whether a linear map is a turn, or one in a mirror, as far as four digits tell.
+pub(crate) fn is_rigid(linear: DMat3) -> bool {
+    let similar = is_similarity_but_for(linear, RIGHT_ANGLE_TOLERANCE);
+    similar && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE
+}
 
 impl Camera {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {

@@ -39,7 +39,7 @@ impl Import<'_> {
         let kind = match plugin {
             "point" => self.point(&bag, &mut fields)?,
             "constant" => self.constant(&bag, &mut fields)?,
-            "envmap" => envmap(&bag, &mut fields)?,
+            "envmap" => self.envmap(&bag, &mut fields)?,
             "spot" => self.spot(&bag, &mut fields)?,
             "directional" => self.directional(&bag, &mut fields)?,
             "projector" => self.projector(&bag, &mut fields)?,
@@ -109,8 +109,7 @@ impl Import<'_> {
     }
 
     fn spot(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
-        let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-        round(bag, to_world)?;
+        let to_world = self.round(bag, bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY))?;
         let place = bag.place("to_world");
         fields.add("position", numbers(place, &to_world.transform_point3(DVec3::ZERO).to_array()));
         fields.add("direction", numbers(place, &to_world.transform_vector3(DVec3::Z).to_array()));
@@ -141,8 +140,7 @@ impl Import<'_> {
     }
 
     fn projector(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
-        let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-        keeps_lengths(bag, to_world)?;
+        let to_world = self.rigid(bag, bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY))?;
         let place = bag.place("to_world");
         fields.add("origin", numbers(place, &to_world.transform_point3(DVec3::ZERO).to_array()));
         fields.add("target", numbers(place, &to_world.transform_point3(DVec3::Z).to_array()));
@@ -179,8 +177,7 @@ impl Import<'_> {
 
     fn sunsky(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
         let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-        let linear = DMat3::from_mat4(to_world);
-        keeps_lengths(bag, to_world)?;
+        let linear = DMat3::from_mat4(self.rigid(bag, to_world)?);
         let given = PLACE_AND_TIME.into_iter().find(|name| bag.has(name));
         let direction = match (bag.vector("sun_direction")?, given) {
             (Some(_), Some(given)) => {
@@ -220,6 +217,55 @@ impl Import<'_> {
         fields.add("transform", list(place, [entry(place, "matrix", matrix(place, frame))]));
         Ok("sky")
     }
+
+    fn envmap(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
+        let file = bag.required("filename", bag.file("filename"))?;
+        fields.add("file", text(bag.place("filename"), file));
+        let scale = bag.float("scale")?.unwrap_or(1.0);
+        not_negative(bag, "scale", &[scale])?;
+        fields.add("scale", number(bag.place("scale"), scale * DAYLIGHT));
+        // How it is sampled.
+        bag.boolean("mis_compensation")?;
+        fields.add("mapping", text(bag.object.place, "mitsuba"));
+        if let Some(to_world) = bag.transform("to_world")? {
+            let place = bag.place("to_world");
+            let linear = DMat3::from_mat4(to_world);
+            let to_world = if is_similarity(linear) {
+                unscaled(bag, linear.x_axis.length())?;
+                to_world
+            } else {
+                // Other transforms are refused where they are read.
+                self.turned(bag, to_world, 1.0).unwrap_or(to_world)
+            };
+            fields.add("transform", list(place, [entry(place, "matrix", matrix(place, to_world))]));
+        }
+        Ok("environment")
+    }
+
+    /// A transform that leaves a cone round, and its angle what it is.
+    fn round(&mut self, bag: &Bag<'_>, to_world: DMat4) -> Result<DMat4, Fault> {
+        let linear = DMat3::from_mat4(to_world);
+        if is_similarity(linear) {
+            return Ok(to_world);
+        }
+        let message = "expected turns, moves, mirrors and even scaling, found another transform";
+        let scale = libm::cbrt(linear.determinant().abs());
+        self.turned(bag, to_world, scale).ok_or_else(|| bag.fault_of("to_world", message))
+    }
+
+    /// A transform that only moves, turns and mirrors what throws a picture: Mitsuba lets light on what is diffuse grow with a
+    /// scale, as that from infinity.
+    fn rigid(&mut self, bag: &Bag<'_>, to_world: DMat4) -> Result<DMat4, Fault> {
+        let linear = DMat3::from_mat4(to_world);
+        let gram = linear.transpose() * linear;
+        // Numbers of six digits, as in shapes.
+        let off = (gram - DMat3::IDENTITY).to_cols_array().into_iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        if off <= 3e-6 {
+            return Ok(to_world);
+        }
+        let message = "expected turns, moves and mirrors, found a transform that scales or shears";
+        self.turned(bag, to_world, 1.0).ok_or_else(|| bag.fault_of("to_world", message))
+    }
 }
 
 /// What tells where the sun stands, besides its direction.
@@ -257,41 +303,12 @@ fn sun_by_place(bag: &Bag<'_>) -> Result<DVec3, Fault> {
     Ok(DVec3::new(-level * cos, -level * sin, up))
 }
 
-fn envmap(bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
-    let file = bag.required("filename", bag.file("filename"))?;
-    fields.add("file", text(bag.place("filename"), file));
-    let scale = bag.float("scale")?.unwrap_or(1.0);
-    not_negative(bag, "scale", &[scale])?;
-    fields.add("scale", number(bag.place("scale"), scale * DAYLIGHT));
-    // How it is sampled.
-    bag.boolean("mis_compensation")?;
-    fields.add("mapping", text(bag.object.place, "mitsuba"));
-    if let Some(to_world) = bag.transform("to_world")? {
-        let place = bag.place("to_world");
-        let linear = DMat3::from_mat4(to_world);
-        // Other transforms are refused where they are read.
-        if is_similarity(linear) {
-            unscaled(bag, linear.x_axis.length())?;
-        }
-        fields.add("transform", list(place, [entry(place, "matrix", matrix(place, to_world))]));
-    }
-    Ok("environment")
-}
-
 /// How often light is looked for there; 0 is never.
 fn weight(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
     if let Some(weight) = bag.float("sampling_weight")? {
         fields.add("sampling_weight", number(bag.place("sampling_weight"), weight));
     }
     Ok(())
-}
-
-/// That a transform leaves a cone round, and its angle what it is.
-fn round(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
-    if is_similarity(DMat3::from_mat4(to_world)) {
-        return Ok(());
-    }
-    Err(bag.fault_of("to_world", "expected turns, moves, mirrors and even scaling, found another transform"))
 }
 
 /// That a transform which makes `length` of 1 leaves directions as long as they are. Mitsuba takes what it gets for a unit
@@ -303,19 +320,6 @@ fn unscaled(bag: &Bag<'_>, length: f64) -> Result<(), Fault> {
     let message =
         format!("expected a transform without scaling of a light from infinity, found a scale of {length:.6}");
     Err(bag.fault_of("to_world", message))
-}
-
-/// That a transform only moves, turns and mirrors what throws a picture: Mitsuba lets light on what is diffuse grow with a
-/// scale, as that from infinity.
-fn keeps_lengths(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
-    let linear = DMat3::from_mat4(to_world);
-    let gram = linear.transpose() * linear;
-    // Numbers of six digits, as in shapes.
-    let off = (gram - DMat3::IDENTITY).to_cols_array().into_iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    if off <= 3e-6 {
-        return Ok(());
-    }
-    Err(bag.fault_of("to_world", "expected turns, moves and mirrors, found a transform that scales or shears"))
 }
 
 /// Enters where a picture has its top, along `up` and with v downward; in a mirror u grows to the other side, as it does upside down.

@@ -34,6 +34,7 @@ mod sensors;
 mod shapes;
 mod spectra;
 mod textures;
+mod turns;
 mod volumes;
 mod xml;
 

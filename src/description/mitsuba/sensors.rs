@@ -1,7 +1,8 @@
 //! Sensors with their film, filter and sampler: the fields `camera`, `image`, `render`, `output`.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 
+use super::super::camera::is_rigid;
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, quote};
 use super::object::{Bag, Family};
@@ -25,7 +26,14 @@ impl Import<'_> {
             return Err(bag.unknown(SENSORS));
         }
         let mut camera = Fields::new(place);
-        let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        let written = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        let to_world = match plugin {
+            // Others are refused where they are read.
+            "perspective" | "thinlens" if !is_rigid(DMat3::from_mat4(written)) => {
+                self.turned(&bag, written, 1.0).unwrap_or(written)
+            }
+            _ => written,
+        };
         // Ours has +x to the right of the picture.
         let ours = to_world * DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         camera.add("to_world", matrix(bag.place("to_world"), ours));
