@@ -305,6 +305,10 @@ fn samples_of_direct(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
 fn depth(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
     match bag.integer("max_depth")? {
         None | Some(-1) => {}
+        Some(depth) if depth < -1 => {
+            let message = format!("expected -1, for no limit, or a whole number of 0 or more, found {depth}");
+            return Err(bag.fault_of("max_depth", message));
+        }
         Some(depth) => fields.add("max_depth", whole(bag.place("max_depth"), depth)),
     }
     if let Some(depth) = bag.integer("rr_depth")? {
@@ -379,7 +383,9 @@ mod tests {
             };
             assert!(matches!(good(&depth(0)).integrator, Integrator::None(_)));
             assert!(!matches!(good(&depth(1)).integrator, Integrator::None(_)));
-            assert!(fault(&depth(-2), &[]).contains("max_depth: expected"), "{}", fault(&depth(-2), &[]));
+            let told = fault(&depth(-2), &[]);
+            let expected = "max_depth: expected -1, for no limit, or a whole number of 0 or more, found -2";
+            assert!(told.ends_with(expected), "{told}");
         }
     }
 
