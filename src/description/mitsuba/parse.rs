@@ -42,6 +42,14 @@ pub(crate) struct Define {
 }
 
 impl Define {
+    /// The value, in which `\$` is a dollar as it is in XML. Mitsuba fills parameters into parameters, in an order of its own.
+    fn plain(&self, sources: &Sources) -> Result<String> {
+        if self.value.matches('$').count() == self.value.matches("\\$").count() {
+            return Ok(self.value.replace("\\$", "$"));
+        }
+        Err(self.fault("expected a value without other parameters, found a $; \\$ is a dollar", sources))
+    }
+
     /// A fault of it.
     fn fault(&self, message: &str, sources: &Sources) -> Error {
         match self.place {
@@ -73,12 +81,13 @@ pub(crate) fn read(path: &Path, defines: &[Define], sources: &mut Sources) -> Re
         unreadable: None,
     };
     for define in defines {
-        let Define { name, value, .. } = define;
+        let Define { name, .. } = define;
         if parser.parameters.iter().any(|parameter| parameter.name == *name) {
             let message = format!("expected each name once, found {} again", quote(name));
             return Err(define.fault(&message, parser.sources));
         }
-        parser.parameters.push(Parameter { name: name.clone(), value: value.clone(), used: false });
+        let value = define.plain(parser.sources)?;
+        parser.parameters.push(Parameter { name: name.clone(), value, used: false });
     }
     let outcome = parser.file(path, None, None).and_then(|()| parser.resolve());
     if let Some(error) = parser.unreadable.take() {

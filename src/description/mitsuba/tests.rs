@@ -93,6 +93,19 @@ fn parameters_are_filled_in_anywhere_in_a_value() {
     }
 }
 
+/// Mitsuba 3.9.1 takes 4 for the first of these; a number was told that is none, and text stood as it is.
+#[test]
+fn values_of_parameters_name_no_parameters() {
+    let text = "<shape type=\"sphere\"><float name=\"radius\" value=\"$a\"/></shape>";
+    for value in ["$b", "2$", "\\$b$"] {
+        let told = fault(text, &[("a", value), ("b", "4")]);
+        let expected = "expected a value without other parameters, found a $; \\$ is a dollar";
+        assert_eq!(told, format!("-D a={value}: {expected}"));
+    }
+    let named = "<bsdf type=\"diffuse\" id=\"$a\"/>";
+    assert!(scene(named, &[("a", "two \\$")]).unwrap().materials.contains_key("two $"));
+}
+
 /// As in Mitsuba 3.9.1, where each of these counts as a use.
 #[test]
 fn parameters_are_used_in_names_and_where_they_are_empty() {
