@@ -84,6 +84,8 @@ impl Import<'_> {
     /// The pairs of a scene. Where no light is simulated at any of their wavelengths they are 0, and told; in µm, as it seems,
     /// they are left to be refused.
     fn written_table(&mut self, place: Place, pairs: &[[f64; 2]]) -> Node {
+        let cut = from_band(pairs);
+        let pairs = cut.as_deref().unwrap_or(pairs);
         let samples: Vec<(f64, f64)> = pairs.iter().map(|[nm, value]| (*nm, *value)).collect();
         let ([low, high], [first, last]) =
             (BAND_NM, [pairs.first(), pairs.last()].map(|pair| pair.map_or(0.0, |p| p[0])));
@@ -166,7 +168,16 @@ impl Import<'_> {
                 number(place, value)
             }
             "d65" => self.daylight(&bag, role)?,
-            "srgb" => srgb(&bag, role)?,
+            "srgb" => {
+                bag.boolean("unbounded")?;
+                srgb(&bag, "color", role)?
+            }
+            // What `<rgb>` and `<spectrum>` say, as plugins, without the D65 of what shines.
+            "rgb" | "spectrum" if matches!(bag.value("value"), Some(Value::Rgb(_))) => srgb(&bag, "value", role)?,
+            "rgb" | "spectrum" => {
+                let plain = if role == Role::Emission { Role::Coefficient } else { role };
+                bag.required("value", self.spectrum(&bag, "value", plain))?
+            }
             "regular" | "irregular" if bag.has("value") => match bag.value("value") {
                 Some(Value::Spectrum(SpectrumValue::Table(pairs))) => self.written_table(place, pairs),
                 Some(Value::Spectrum(SpectrumValue::File(path))) => file(place, path),
@@ -201,16 +212,27 @@ impl Import<'_> {
     }
 }
 
-/// The curve by which a surface of a colour reflects.
-fn srgb(bag: &Bag<'_>, role: Role) -> Result<Node, Fault> {
+/// Of a table that begins at 0 nm or less, which are no wavelengths, what is within the band and beyond.
+fn from_band(pairs: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    let increases = pairs.is_sorted_by(|a, b| a[0] < b[0]);
+    let after = pairs.iter().position(|pair| pair[0] > BAND_NM[0])?;
+    if !increases || pairs[0][0] > 0.0 {
+        return None;
+    }
+    let ([x, y], [next_x, next_y]) = (*pairs.get(after.checked_sub(1)?)?, pairs[after]);
+    let begin = y + (next_y - y) * (BAND_NM[0] - x) / (next_x - x);
+    Some([[BAND_NM[0], begin]].into_iter().chain(pairs[after..].iter().copied()).collect())
+}
+
+/// The curve by which a surface of the colour `name` reflects.
+fn srgb(bag: &Bag<'_>, name: &'static str, role: Role) -> Result<Node, Fault> {
     let place = bag.object.place;
-    let rgb = bag.required("color", bag.rgb("color"))?;
-    bag.boolean("unbounded")?;
+    let rgb = bag.required(name, bag.rgb(name))?;
     match role {
         Role::Reflectance => Ok(entry(place, "rgb", numbers(place, &rgb))),
         // What a surface of this colour reflects, also as light: there is no D65 in it.
         Role::Emission | Role::Coefficient => {
-            let curve = upsample::reflectance(rgb).map_err(|message| bag.fault_of("color", message))?;
+            let curve = upsample::reflectance(rgb).map_err(|message| bag.fault_of(name, message))?;
             Ok(sampled(place, BAND_NM, &curve))
         }
     }
@@ -238,7 +260,8 @@ fn blackbody(bag: &Bag<'_>, role: Role) -> Result<Node, Fault> {
 }
 
 /// Plugins that are a spectrum, the same everywhere.
-pub(super) const SPECTRA: [&str; 7] = ["uniform", "rawconstant", "d65", "srgb", "regular", "irregular", "blackbody"];
+pub(super) const SPECTRA: [&str; 9] =
+    ["uniform", "rawconstant", "d65", "srgb", "rgb", "spectrum", "regular", "irregular", "blackbody"];
 
 /// A curve at one wavelength, nm.
 pub(crate) fn at(curve: &Curve, nm: f64) -> f64 {
@@ -345,6 +368,46 @@ mod tests {
         // What reaches the band is what it says.
         assert!(matches!(radiance(&pairs("300:1, 361:2")), Spectrum::ZeroOutside(_)));
         assert!(matches!(radiance(&pairs("0.4:1, 0.7:2")), Spectrum::ZeroOutside(_)));
+    }
+
+    /// Linear from 1 at 0 nm to 3 at 1000 nm: 1.72 at 360. Mitsuba 3.9.1 reads it.
+    #[test]
+    fn a_table_may_begin_at_no_wavelength() {
+        let regular = "<spectrum type=\"regular\" name=\"radiance\"><float name=\"wavelength_min\" value=\"0\"/>\
+                       <float name=\"wavelength_max\" value=\"2000\"/><string name=\"values\" value=\"1, 3, 2\"/></spectrum>";
+        let pairs = "<spectrum name=\"radiance\" value=\"-1000:-1, 1000:3, 2000:2\"/>";
+        for spectrum in [regular, pairs] {
+            let Spectrum::Table(table) = radiance(spectrum) else { panic!("a table: {spectrum}") };
+            assert_eq!((table[0][0], &table[1..]), (360.0, &[[1000.0, 3.0], [2000.0, 2.0]][..]), "{spectrum}");
+            assert!((table[0][1] - 1.72).abs() < 1e-14, "{table:?}");
+        }
+        let unordered = "<spectrum type=\"irregular\" name=\"radiance\"><string name=\"wavelengths\" value=\"0, 900, 800\"/>\
+                         <string name=\"values\" value=\"1, 2, 3\"/></spectrum>";
+        for other in ["<spectrum name=\"radiance\" value=\"0:1, 0.7:2\"/>", unordered] {
+            let told = fault(&format!("<emitter type=\"constant\">{other}</emitter>"), &[]);
+            assert!(told.contains("for wavelengths increase, found 0"), "{told}");
+        }
+    }
+
+    /// Mitsuba 3.9.1 makes of them what such a property of a surface is.
+    #[test]
+    fn the_words_of_properties_are_plugins() {
+        let sky = |kind: &str, value: &str| {
+            radiance(&format!("<spectrum type=\"{kind}\" name=\"radiance\">{value}</spectrum>"))
+        };
+        let rgb = |name: &str| format!("<rgb name=\"{name}\" value=\"0.9, 0.3, 0.1\"/>");
+        assert_eq!(sky("rgb", &rgb("value")), sky("srgb", &rgb("color")));
+        assert_eq!(sky("spectrum", "<spectrum name=\"value\" value=\"2\"/>"), Spectrum::Number(2.0));
+        assert_eq!(sky("spectrum", "<float name=\"value\" value=\"2\"/>"), Spectrum::Number(2.0));
+        let scene = good(&format!(
+            "<texture type=\"rgb\" id=\"t\">{}</texture><bsdf type=\"diffuse\" id=\"m\"><ref name=\"reflectance\" id=\"t\"/></bsdf>",
+            rgb("value")
+        ));
+        let Material::Diffuse(diffuse) = &scene.materials["m"] else { panic!("diffuse") };
+        let SpectrumOrTexture::Spectrum(Spectrum::Rgb(found)) = &diffuse.reflectance else { panic!("a colour") };
+        assert_eq!(*found, [0.9, 0.3, 0.1]);
+        let none = fault("<emitter type=\"constant\"><texture type=\"rgb\" name=\"radiance\"/></emitter>", &[]);
+        assert!(none.contains("\"value\", found none"), "{none}");
     }
 
     /// Mitsuba 3.9.1 shows this sky as 1.0371 0.2862 0.0860, and one of `<rgb>`, under D65, as 0.9005 0.2998 0.0998.
