@@ -8,6 +8,7 @@ use glam::{DMat3, DMat4, DVec3};
 use super::super::fault::Fault;
 use super::super::transform::{is_mirror, is_similarity};
 use super::object::{Bag, Family};
+use super::parse::ABOUT_ONE;
 use super::{Fields, Import, boolean, entry, list, matrix, named, number, numbers, text, whole};
 use crate::math::Frame;
 
@@ -30,13 +31,6 @@ const SHAPES: [&str; 14] = [
 
 /// How far from equal and perpendicular the axes of a cylinder may come out: see the check of transforms.
 const SIMILAR: f64 = 3e-6;
-
-/// What an entry of a matrix of six decimals may be off by, for what is small: of spheres and cylinders of a few centimetres that is more
-/// than the sixth figure.
-const SIXTH_DECIMAL: f64 = 5e-7;
-
-/// What that may come to, of the scale.
-const LEAST_ROUND: f64 = 1e-3;
 
 impl Import<'_> {
     /// Adds a shape of the scene to `shapes`, a group to `groups`.
@@ -61,7 +55,14 @@ impl Import<'_> {
         }
         let mut fields = Fields::new(bag.object.place);
         let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-        let to_world = if bag.object.plugin == "sphere" { kept_round(to_world) } else { to_world };
+        let linear = DMat3::from_mat4(to_world);
+        let to_world = match bag.object.plugin.as_str() {
+            // Others are refused where they are read.
+            "sphere" if !is_similarity(linear) => {
+                self.turned(&bag, to_world, libm::cbrt(linear.determinant().abs())).unwrap_or(to_world)
+            }
+            _ => to_world,
+        };
         if to_world != DMat4::IDENTITY && bag.object.plugin != "cylinder" {
             let at = bag.place("to_world");
             fields.add("transform", list(at, [entry(at, "matrix", matrix(at, to_world))]));
@@ -99,7 +100,7 @@ impl Import<'_> {
                 "sphere"
             }
             "cylinder" => {
-                cylinder(bag, to_world, mirrored, fields)?;
+                self.cylinder(bag, to_world, mirrored, fields)?;
                 "cylinder"
             }
             "disk" => {
@@ -209,61 +210,43 @@ impl Import<'_> {
         }
         Ok(())
     }
-}
 
-/// The similarity that a matrix of six decimals stands for, where it is one: the nearest rotation (Higham 1986, "Computing the Polar
-/// Decomposition", the mean of a matrix and its inverse transposed, again and again) times the root of the mean square of the scales.
-fn kept_round(to_world: DMat4) -> DMat4 {
-    let linear = DMat3::from_mat4(to_world);
-    let scale = (linear.to_cols_array().iter().map(|x| x * x).sum::<f64>() / 3.0).sqrt();
-    let off = |similar: DMat3| (similar - linear).to_cols_array().iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    if is_similarity(linear) || SIXTH_DECIMAL > LEAST_ROUND * scale {
-        return to_world;
+    /// A cylinder where it lies in the world: its transform may stretch it along its axis. What is mirrored is put down as its
+    /// image in the plane x = 0, which a transform of its own mirrors back, textures and all.
+    fn cylinder(&mut self, bag: &Bag<'_>, to_world: DMat4, mirrored: bool, fields: &mut Fields) -> Result<(), Fault> {
+        let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        let to_world = if mirrored { mirror * to_world } else { to_world };
+        let base = DVec3::from(bag.vector("p0")?.unwrap_or_default());
+        let top = DVec3::from(bag.vector("p1")?.unwrap_or([0.0, 0.0, 1.0]));
+        let radius = bag.float("radius")?.unwrap_or(1.0);
+        let Some(axis) = (top - base).try_normalize() else {
+            return Err(bag.fault_of("p1", "expected a point other than p0"));
+        };
+        let frame = Frame::from_normal(axis);
+        let [s, t, n] = [frame.s, frame.t, axis].map(|v| to_world.transform_vector3(v));
+        let across = [(s.dot(t), s, t), (s.dot(n), s, n), (t.dot(n), t, n)];
+        let apart = across.iter().map(|(dot, a, b)| dot.abs() / (a.length() * b.length()));
+        let off = apart.fold((s.length() / t.length() - 1.0).abs(), f64::max);
+        if off > SIMILAR && off <= ABOUT_ONE {
+            let message =
+                format!("to_world: it keeps a cylinder round and straight but for {off:.1e}, its digits; it stays one");
+            self.notes.push((bag.place("to_world"), message));
+        } else if off.is_nan() || off > SIMILAR {
+            let expected =
+                "expected moves, turns and scales that keep a cylinder round and straight, found another transform";
+            return Err(bag.fault_of("to_world", expected));
+        }
+        fields.add("base", numbers(bag.place("p0"), &to_world.transform_point3(base).to_array()));
+        fields.add("top", numbers(bag.place("p1"), &to_world.transform_point3(top).to_array()));
+        fields.add("radius", number(bag.place("radius"), radius * s.length()));
+        fields.add("caps", text(bag.object.place, "none"));
+        fields.add("seam", numbers(bag.place("to_world"), &s.to_array()));
+        if mirrored {
+            let at = bag.place("to_world");
+            fields.add("transform", list(at, [entry(at, "matrix", matrix(at, mirror))]));
+        }
+        Ok(())
     }
-    let rotation = (0..8).fold(linear * (1.0 / scale), |r, _| (r + r.inverse().transpose()) * 0.5);
-    let similar = rotation * scale;
-    // The scale and the turn are of the rounded entries, too.
-    match off(similar) <= 2.0 * SIXTH_DECIMAL {
-        true => DMat4::from_mat3_translation(similar, to_world.w_axis.truncate()),
-        false => to_world,
-    }
-}
-
-/// A cylinder where it lies in the world: its transform may stretch it along its axis. What is mirrored is put down as its
-/// image in the plane x = 0, which a transform of its own mirrors back, textures and all.
-fn cylinder(bag: &Bag<'_>, to_world: DMat4, mirrored: bool, fields: &mut Fields) -> Result<(), Fault> {
-    let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-    let to_world = if mirrored { mirror * to_world } else { to_world };
-    let base = DVec3::from(bag.vector("p0")?.unwrap_or_default());
-    let top = DVec3::from(bag.vector("p1")?.unwrap_or([0.0, 0.0, 1.0]));
-    let radius = bag.float("radius")?.unwrap_or(1.0);
-    let Some(axis) = (top - base).try_normalize() else {
-        return Err(bag.fault_of("p1", "expected a point other than p0"));
-    };
-    let frame = Frame::from_normal(axis);
-    let [s, t, n] = [frame.s, frame.t, axis].map(|v| to_world.transform_vector3(v));
-    let across = [(s.dot(t), s, t), (s.dot(n), s, n), (t.dot(n), t, n)];
-    // Three entries add up to each of three coordinates.
-    let similar = |a: DVec3, b: DVec3| {
-        let decimals = 3.0 * SIXTH_DECIMAL * (1.0 / a.length() + 1.0 / b.length());
-        SIMILAR.max(decimals.min(LEAST_ROUND))
-    };
-    let round = (s.length() / t.length() - 1.0).abs() <= similar(s, t);
-    if !round || !across.iter().all(|&(dot, a, b)| dot.abs() <= similar(a, b) * a.length() * b.length()) {
-        let expected =
-            "expected moves, turns and scales that keep a cylinder round and straight, found another transform";
-        return Err(bag.fault_of("to_world", expected));
-    }
-    fields.add("base", numbers(bag.place("p0"), &to_world.transform_point3(base).to_array()));
-    fields.add("top", numbers(bag.place("p1"), &to_world.transform_point3(top).to_array()));
-    fields.add("radius", number(bag.place("radius"), radius * s.length()));
-    fields.add("caps", text(bag.object.place, "none"));
-    fields.add("seam", numbers(bag.place("to_world"), &s.to_array()));
-    if mirrored {
-        let at = bag.place("to_world");
-        fields.add("transform", list(at, [entry(at, "matrix", matrix(at, mirror))]));
-    }
-    Ok(())
 }
 
 fn mesh(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {

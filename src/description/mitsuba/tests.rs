@@ -171,21 +171,30 @@ fn a_camera_may_be_turned_by_rounded_numbers() {
     assert!(sheared.ends_with(told), "{sheared}");
 }
 
-/// A turn by 45 degrees of what is 5 cm large, as C's `%f` prints it: 1.4e-5 of the scale away from one. What is stretched by more is
-/// refused as ever.
+/// A turn by 45 degrees of what is 5 cm large, as C's `%f` prints it: 1.4e-5 of the scale away from one, which a note tells. What is
+/// stretched by more than a thousandth is refused as ever.
 #[test]
 fn balls_and_cylinders_may_be_placed_by_six_decimals() {
     let placed = |plugin: &str, z: &str| {
         let rows = format!("0.035355 -0.035355 0 1 0.035355 0.035355 0 2 0 0 {z} 3 0 0 0 1");
         format!("<shape type=\"{plugin}\"><transform name=\"to_world\"><matrix value=\"{rows}\"/></transform></shape>")
     };
+    let told = |plugin: &str, z: &str, word: &str| {
+        let scene = good(&placed(plugin, z));
+        scene.locator.notes().iter().any(|note| note.contains(word))
+    };
+    assert!(told("sphere", "0.05", "the nearest is taken"));
+    assert!(!told("cylinder", "0.05", "its digits"), "columns of like lengths that are at right angles");
     let linear = DMat3::from_mat4(good(&placed("sphere", "0.05")).shapes[0].world_from_object());
     let gram = linear.transpose() * linear;
     let off = (gram - DMat3::IDENTITY * gram.x_axis.x).to_cols_array().map(f64::abs);
     // Scale squared to the half of the sixth decimal, twice over 0.05.
     assert!((gram.x_axis.x / 0.0025 - 1.0).abs() < 2e-5 && off.iter().all(|x| *x < 1e-15), "{gram}");
-    good(&placed("cylinder", "0.05"));
-    good(&placed("cylinder", "0.07"));
+    let turned = "0.036 -0.035 0 0 0.035 0.036 0.0000251 0 0 0 0.05 0 0 0 0 1";
+    let scene = format!(
+        "<shape type=\"cylinder\"><transform name=\"to_world\"><matrix value=\"{turned}\"/></transform></shape>"
+    );
+    assert!(good(&scene).locator.notes().iter().any(|note| note.contains("but for 3.6e-4, its digits")));
     assert!(fault(&placed("sphere", "0.0501"), &[]).contains("expected moves, turns and even scaling"));
 }
 
