@@ -453,9 +453,9 @@ mod tests {
             "dir/s.yaml:3:90: lights[0].spot.beam_deg: expected an angle from 0 to cutoff_deg, 30 degrees, found 31"
         );
         assert_eq!(spot("cutoff_deg: 90, beam_deg: 90"), "none");
-        let told = spot("cutoff_deg: 90, texture: {checkerboard: {}}");
+        let told = spot("cutoff_deg: 90, texture: t");
         assert!(
-            told.ends_with("expected an angle below 90 degrees where the spot throws a picture, found 90"),
+            told.contains("expected an angle below 90 degrees where the spot throws a picture, found 90"),
             "{told}"
         );
     }

@@ -165,7 +165,7 @@ fn a_camera_may_be_turned_by_rounded_numbers() {
         SceneDescription::of_tree(root, &path, sources)
     };
     with("-0.00500708").unwrap();
-    let sheared = with("-0.00700708").unwrap_err().to_string();
+    let sheared = with("-0.00900708").unwrap_err().to_string();
     let told =
         "camera.to_world: expected moves, turns and mirrors for a perspective, found a matrix that scales or shears";
     assert!(sheared.ends_with(told), "{sheared}");
