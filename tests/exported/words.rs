@@ -17,7 +17,7 @@ fn a_scene_in_which_no_lamp_is_looked_for_is_one_of_mitsubas() {
     let lamps = ["shapes[1].disk", "lights[0].point", "lights[1].constant"];
     let told =
         lamps.map(|lamp| format!("{lamp}.sampling_weight: 1: Mitsuba wants one lamp at least that it looks for"));
-    assert_eq!(losses, [&told[..], &[second.clone()]].concat());
+    assert_eq!(losses, [&told[..], std::slice::from_ref(&second)].concat());
     assert!(!xml.contains("name=\"sampling_weight\""), "{xml}");
     let (losses, xml) = exported_with(&lights(2), disk);
     assert_eq!(losses, [second]);
