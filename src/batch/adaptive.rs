@@ -205,8 +205,10 @@ impl Allocation {
     #[must_use]
     pub fn from(window: Window, first: u32, shares: Vec<[i16; HALVES]>, outlook: Outlook) -> Option<Allocation> {
         let grid = Grid::of(window);
-        let even = [0, 1].map(|half| shares.iter().all(|shares: &[i16; HALVES]| shares[half] == 0));
-        (shares.len() == grid.cells()).then_some(Allocation { grid, first, shares, even, outlook })
+        (shares.len() == grid.cells()).then(|| {
+            let even = [0, 1].map(|half| shares.iter().all(|shares| shares[half] == 0));
+            Allocation { grid, first, shares, even, outlook }
+        })
     }
 
     /// What becomes of the picture.
@@ -373,23 +375,25 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
     };
     let has_some = |cell: &usize| !tried[*cell].pixels.is_empty();
     let wishes: Vec<f64> = (0..grid.cells()).filter(has_some).map(wish).collect();
-    let own = |cell: usize| has_some(&cell).then(|| variance_of_both(&tried[cell].pixels, floor));
-    let mut variances: Vec<Option<f64>> = (0..grid.cells()).map(own).collect();
-    let wishes = match job.plan.splatting || job.plan.reuse || grid.cells() <= FEW {
-        false => wishes,
+    let (wishes, variances) = match job.plan.splatting || job.plan.reuse || grid.cells() <= FEW {
+        false => {
+            let own = |cell: usize| has_some(&cell).then(|| variance_of_both(&tried[cell].pixels, floor));
+            (wishes, (0..grid.cells()).map(own).collect())
+        }
         true => {
             // How much more or less they wish for is told by some, where pixels by themselves tell anything.
             let whole = variances_of_whole_cells(job, first, seed, floor, pause)?;
-            variances.fill(None);
+            let mut variances = vec![None; grid.cells()];
             whole.iter().for_each(|&(cell, variance)| variances[cell] = Some(variance));
             let whole: Vec<(usize, f64)> =
                 whole.into_iter().map(|(cell, own)| (cell, self::wish(own, costs[cell]))).collect();
             let sums = whole.iter().filter(|(cell, _)| has_some(cell));
             let (told, alone) = sums.fold((0.0, 0.0), |(told, alone), &(cell, own)| (told + own, alone + wish(cell)));
-            match told > 0.0 && alone > 0.0 && grid.cells() > FEW {
+            let wishes = match told > 0.0 && alone > 0.0 && grid.cells() > FEW {
                 true => wishes.iter().map(|own| own * (told / alone)).collect(),
                 false => whole.into_iter().map(|(_, own)| own).collect(),
-            }
+            };
+            (wishes, variances)
         }
     };
     let least = if job.stop.is_open() { LEAST } else { LEAST.max(f64::from(first) / f64::from(job.samples)) };
@@ -488,8 +492,7 @@ pub fn decide(job: &FrameJob, adaptive: Adaptive, film: &Film, scale: &Scale) ->
         true => Outlook::default(),
         false => Outlook::new(first, kinds.collect()),
     };
-    let even = [0, 1].map(|half| shares.iter().all(|shares| shares[half] == 0));
-    Allocation { grid, first, shares, even, outlook }
+    Allocation::from(film.window(), first, shares, outlook).expect("a share for each cell of the film")
 }
 
 #[cfg(test)]

@@ -128,12 +128,8 @@ impl MeshSource {
 impl MeshSource {
     /// True where most of the area has its vertex normals on the side from which its corners are clockwise.
     fn is_wound_against_its_normals(&self) -> bool {
-        let agreement = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|v| self.positions[v as usize]);
-            let n = t.map(|v| self.normals[v as usize]);
-            (b - a).cross(c - a).dot(n[0] + n[1] + n[2])
-        };
-        self.triangles.iter().map(agreement).sum::<f64>() < 0.0
+        let of = |t: &[u32; 3]| agreement(*t, |v| self.positions[v], |v| self.normals[v]);
+        self.triangles.iter().map(of).sum::<f64>() < 0.0
     }
 }
 
@@ -246,11 +242,9 @@ impl Mesh {
     /// Winds the triangles, still as in the file, so that their outside is where the normals at their corners are; those of which that
     /// cannot be said as most of the area.
     fn turn_to_normals(&mut self) {
-        let agreement = |i: usize| {
-            let n = self.triangles[i].map(|v| DVec3::from(self.normals[v as usize].map(f64::from)));
-            self.area_vector(i as u32).dot(n[0] + n[1] + n[2])
-        };
-        let agreements: Vec<f64> = (0..self.triangles.len()).map(agreement).collect();
+        let wide = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+        let of = |t: &[u32; 3]| agreement(*t, |v| wide(self.positions[v]), |v| wide(self.normals[v]));
+        let agreements: Vec<f64> = self.triangles.iter().map(of).collect();
         self.swapped = agreements.iter().sum::<f64>() < 0.0;
         let sign = if self.swapped { -1.0 } else { 1.0 };
         let contrary = agreements.iter().enumerate().filter(|(_, agreement)| sign * **agreement < 0.0);
@@ -520,6 +514,13 @@ fn normal_transform(linear: &DMat3) -> DMat3 {
     let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
     let cofactor = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
     if linear.determinant() < 0.0 { cofactor * -1.0 } else { cofactor }
+}
+
+/// Positive where the normals at the corners of a triangle are on the side from which these are counterclockwise, negative where they are
+/// on the other, and more the larger it is.
+fn agreement(triangle: [u32; 3], position: impl Fn(usize) -> DVec3, normal: impl Fn(usize) -> DVec3) -> f64 {
+    let [a, b, c] = triangle.map(|v| normal(v as usize));
+    area_vector(triangle.map(|v| position(v as usize))).dot(a + b + c)
 }
 
 /// Scales first, as squares of small or large vectors leave the range of f64.
