@@ -6,12 +6,12 @@ use super::stop::Stop;
 use super::{Watcher, adaptive, splatting};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
-use crate::film::filter::FilterSampler;
+use crate::film::filter::{Filter, FilterSampler};
 use crate::film::layers::Kept;
 use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::transport::pilot::{self, Use, Wishes};
-use crate::transport::plan::{Effect, EffectPlan};
+use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use crate::transport::trial::{self, first};
 use crate::transport::{Shot, glints, light};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,8 +55,11 @@ impl Choice<'_> {
         go_on()?;
         plan.caustics = caustics;
         plan.techniques.extend(said);
+        // What counts against a pixel is made up for, and no noise that is to be told.
+        let whole = FilterSampler::new(Filter::Box).expect("a box is a filter");
+        let tried = if count_against(&plan, filter) { &whole } else { filter };
         // What is traced from the lights is no noise of either.
-        let shot = Shot { scene, plan: &plan, filter, seed, photons: None };
+        let shot = Shot { scene, plan: &plan, filter: tried, seed, photons: None };
         if let Some((packets, said)) = trial::packets(&shot, planned, wishes.packets) {
             plan.packets = packets;
             plan.techniques.push(said);
@@ -78,11 +81,11 @@ impl Choice<'_> {
         plan.techniques.extend(said);
         let (splatting, said) = splatting::choose(wish(written.splatting), &plan, filter);
         plan.splatting = splatting;
-        if splatting {
+        if splatting || count_against(&plan, filter) {
             plan.layers.kept = Kept::Weighed;
         }
         plan.techniques.extend(said);
-        let shot = Shot { scene, plan: &plan, filter, seed, photons: None };
+        let shot = Shot { scene, plan: &plan, filter: tried, seed, photons: None };
         if let Some(first) = first::decide(&shot, self.census, moments, planned, wishes) {
             (plan.reuse, plan.shadow_rays, plan.asks_even_sky) = (first.reuse, first.shadow_rays, first.asks_even_sky);
             plan.techniques.extend(first.said);
@@ -98,6 +101,11 @@ impl Choice<'_> {
         plan.techniques.extend(asked_in_vain(description));
         Ok(plan)
     }
+}
+
+/// Whether some samples count against their pixel, whose light is made up for by what others have.
+fn count_against(plan: &EffectPlan, filter: &FilterSampler) -> bool {
+    !filter.is_positive() && !matches!(plan.integrator, Integrator::Whitted(_))
 }
 
 /// Whether a technique is used.

@@ -4,7 +4,7 @@ use super::adaptive::{self, Allocation};
 use super::frame::FrameJob;
 use super::splatting::{self, Block, Dealt, Pool};
 use crate::film::accumulate::{Invalid, REPLICATES, TileBuffer};
-use crate::film::layers::{self, Layout};
+use crate::film::layers::{self, Kept, Layout};
 use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
@@ -53,7 +53,8 @@ pub(super) fn render_unit(
             wanted.extend(indices.map(address));
         }
     };
-    let sums = Sums { tile, runs: Runs::default() };
+    let weighed = tile.layers.layout().kept == Kept::Weighed;
+    let sums = Sums { tile, weighed, runs: Runs::default() };
     let mut unit = Unit { shot, moments, memory: Samples::default(), sums, pools: Vec::new(), numbers: Vec::new() };
     let window = unit.sums.tile.window();
     if plan.splatting {
@@ -237,6 +238,8 @@ fn follow(
 /// A tile and what is on its way there.
 struct Sums<'a> {
     tile: &'a mut TileBuffer,
+    /// Whether it counts by how much samples do.
+    weighed: bool,
     runs: Runs,
 }
 
@@ -295,8 +298,9 @@ impl Sums<'_> {
         if self.is_valid(pixel, stream, sample) {
             let xyz = sample.xyz.map(|x| x * sample.weight);
             let alpha = sample.alpha * sample.weight;
-            if !self.runs.light[place][replicate].add(xyz, alpha) {
-                self.tile.add(pixel, replicate, xyz, alpha);
+            let run = &mut self.runs.light[place][replicate];
+            if (run.add(xyz, alpha) || self.tile.add(pixel, replicate, xyz, alpha)) && self.weighed {
+                run.weigh(sample.weight);
             }
         }
     }

@@ -16,7 +16,9 @@
 //!
 //! Where a sample goes to several pixels, by weights with an expected sum of n for n samples, what it adds up to in a pixel is W.
 //! The usual S/W has a bias of order 1/n. Here a replicate has mᵣ = (Sᵣ + c (nᵣ − Wᵣ))/nᵣ, with c = ΣS/ΣW of the others:
-//! they know nothing of Wᵣ, so that there is none, and light that is alike everywhere comes out as it is, as by S/W.
+//! they know nothing of Wᵣ, so that there is none, and light that is alike everywhere comes out as it is, as by S/W. So it is
+//! with samples of filters with negative lobes, some of which count against their pixel. There ΣW may be about zero by chance: where
+//! its magnitude is less than 1/64 of the samples Σn of the others, c is 4096 ΣS ΣW/(Σn)², which is the same there and has no pole.
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
@@ -70,7 +72,7 @@ pub struct Image {
     pub window: Window,
     /// Red, green and blue (or X, Y, Z: what the matrix made), premultiplied by alpha; 0 where there is no sample.
     pub rgb: [Vec<f32>; 3],
-    /// Coverage. A filter with negative lobes may leave it a little outside [0, 1].
+    /// Coverage. A filter with negative lobes may leave it a little outside [0, 1] where it is not the same in the whole pixel.
     pub alpha: Vec<f32>,
     /// Standard error of each value of `rgb`; NaN where fewer than two replicates have samples.
     pub standard_error: [Vec<f32>; 3],
@@ -204,11 +206,14 @@ fn even_among<const N: usize>(
     for (r, mean) in means.iter_mut().enumerate().filter(|(r, _)| counts[*r] > 0) {
         let others = || (0..REPLICATES).filter(|&s| s / group == r / group && s != r && counts[s] > 0);
         let all: f64 = others().map(|s| weights[s]).sum();
+        let samples: u64 = others().map(|s| counts[s]).sum();
+        let least = samples as f64 / 64.0;
+        let share = if all.abs() >= least { 1.0 / all } else { all / (least * least) };
         let lack = 1.0 - weights[r] / counts[r] as f64;
         for (channel, mean) in mean.iter_mut().enumerate() {
-            if all > 0.0 {
-                *mean += others().map(|s| sums[s][channel]).sum::<f64>() / all * lack;
-            } else if weights[r] > 0.0 {
+            if samples > 0 {
+                *mean += others().map(|s| sums[s][channel]).sum::<f64>() * share * lack;
+            } else if weights[r] != 0.0 {
                 *mean = sums[r][channel] / weights[r];
             }
         }
@@ -546,6 +551,20 @@ mod tests {
         let found = evened([4.0, 8.0, 0.0, 0.0], [2; 4]);
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
         assert_eq!(evened([0.0, 6.0, 0.0, 0.0], [0, 2, 0, 0]), [0.0, 2.0, 0.0, 0.0]);
+        // Light of 5 of two samples each, whose weights are 3, -1, -1 and 0.5 in all: what the others weigh is -1.5, 2.5, 2.5 and 1, of six.
+        let weights = [3.0, -1.0, -1.0, 0.5];
+        let mut means = weights.map(|weight| [5.0 * weight / 2.0]);
+        even(&mut means, [2; 4], weights);
+        assert!(means.iter().all(|[mean]| (mean - 5.0).abs() < 1e-14), "{means:?}");
+        // Where the others come to about nothing little is made up for: a quarter at half of 6/64.
+        let weights = [1.0, 1.0, -1.0, 3.0 / 64.0];
+        let mut means = weights.map(|weight| [5.0 * weight / 2.0]);
+        even(&mut means, [2; 4], weights);
+        let others = [3.0 / 64.0, 3.0 / 64.0, 2.0 + 3.0 / 64.0, 1.0];
+        let share = |other: f64| if other < 6.0 / 64.0 { (other * 64.0 / 6.0).powi(2) } else { 1.0 };
+        let expected: [f64; 4] =
+            std::array::from_fn(|r| 2.5 * weights[r] + 5.0 * share(others[r]) * (1.0 - weights[r] / 2.0));
+        assert!(means.iter().zip(expected).all(|([a], b)| (a - b).abs() < 1e-14), "{means:?}");
         // Within halves the first lacks 1 of 2 times 8/3, the second has 1 too many of 4/1, and the other half is as dark as it is.
         let mut means = [[2.0], [4.0], [0.0], [0.0]];
         even_among(HALF, &mut means, [2; 4], [1.0, 3.0, 2.0, 2.0]);

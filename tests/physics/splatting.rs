@@ -76,29 +76,65 @@ fn even_light_has_no_noise() {
     }
 }
 
-/// What the replicates tell of the variance of a pixel is that over seeds. Of 260 pixels and 24 seeds the former has 3 degrees of
-/// freedom each and the latter 23 in all; pixels have their errors in common with some 3, (∫h)²/∫h² of the filter: four standard
-/// errors are 4 √(2 · 3.1 / 260 · (1/23 + 1/72)) = 15 %.
+/// So it is where samples count against their pixel, but where the weights of three replicates come to about nothing, as they do in no
+/// pixel of these pictures.
 #[test]
-fn errors_of_dealt_samples_are_those_that_come() {
-    let bench = || lit("on", (GAUSSIAN, 16, "reuse: off, shadow_rays: 1"), "", &things());
-    let (pixels, _) = over_seeds(bench(), 0..24);
-    let came: f64 = pixels.iter().map(Moments::variance).sum();
-    let mut told = 0.0;
-    for seed in 0..24 {
-        let mut bench = bench();
-        bench.prepared.description.render.seed = seed;
-        told += bench.picture().error.iter().map(|error| error * error).sum::<f64>() / 24.0;
+fn even_light_has_no_noise_under_lobes_below_zero() {
+    for (filter, samples) in [("mitchell", 16), ("catmull_rom", 16), ("{lanczos: {radius: 3}}", 256)] {
+        let yaml = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+             image: {{width: 20, height: 13, filter: {filter}}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             integrator: {{path: {{opaque_sky: true}}}}\nrender: {{samples: {samples}, wavelengths: uniform}}\n\
+             layers: [emission]\n"
+        );
+        let picture = bench_with(&yaml, &[]).grey().picture();
+        assert!(picture.alpha.iter().all(|alpha| (alpha - 1.0).abs() < 1e-6), "{filter}: {:?}", picture.alpha);
+        let mean = picture.y[0];
+        let off = picture.y.iter().map(|y| (y / mean - 1.0).abs()).fold(0.0, f64::max);
+        assert!(off < 64.0 * f64::from(f32::EPSILON), "{filter}: {off}");
     }
-    assert!((told / came - 1.0).abs() < 0.15, "{told:e} told, {came:e} came");
+}
+
+/// What is made up for has no bias with one sample in each replicate, of which all others may count against the pixel, and tells its
+/// noise; as above.
+#[test]
+fn lobes_below_zero_have_the_light_of_many_samples() {
+    for filter in ["mitchell", "{lanczos: {radius: 3}}"] {
+        let bench = |samples| lit("off", (filter, samples, "reuse: off, shadow_rays: 1"), "", &things());
+        let [few, many] = [(4, 0), (64, 100)].map(|(samples, first)| over_seeds(bench(samples), first..first + 60));
+        assert_same_light(filter, &few, &many);
+    }
+}
+
+/// What the replicates tell of the variance of a pixel is that over seeds. Of 260 pixels and 24 seeds the former has 3 degrees of
+/// freedom each and the latter 23 in all, so that their ratio is 23/21 in the mean; pixels have their errors in common with some 3,
+/// (∫h)²/∫h² of the Gaussian: four standard errors are 4 √(3.1 / 260 · (2/72 + 2/23)) = 15 %.
+#[test]
+fn errors_of_weighed_samples_are_those_that_come() {
+    let lanczos = "{lanczos: {radius: 3}}";
+    for (splatting, filter, samples) in [("on", GAUSSIAN, 16), ("off", "mitchell", 64), ("off", lanczos, 64)] {
+        let bench = || lit(splatting, (filter, samples, "reuse: off, shadow_rays: 1"), "", &things());
+        let (pixels, _) = over_seeds(bench(), 0..24);
+        let mut told = vec![0.0; pixels.len()];
+        for seed in 0..24 {
+            let mut bench = bench();
+            bench.prepared.description.render.seed = seed;
+            told.iter_mut().zip(&bench.picture().error).for_each(|(sum, error)| *sum += error * error / 24.0);
+        }
+        let ratios = told.iter().zip(&pixels).map(|(told, came)| told / came.variance());
+        let ratio = ratios.sum::<f64>() / pixels.len() as f64 * 21.0 / 23.0;
+        assert!((ratio - 1.0).abs() < 0.15, "{filter}: {ratio} of what came");
+    }
 }
 
 /// Layers of light change no bit of the picture, and add up to it: each sum of them is rounded to an f32 once a sample, and
 /// a pixel has 16.
 #[test]
 fn layers_of_dealt_light_add_up_to_the_picture_that_they_leave_as_it_is() {
-    for techniques in ["reuse: off", "reuse: on"] {
-        let with = |rest: &str| lit("on", (GAUSSIAN, 16, techniques), rest, &things());
+    for (splatting, filter, techniques) in
+        [("on", GAUSSIAN, "reuse: off"), ("on", GAUSSIAN, "reuse: on"), ("off", "mitchell", "reuse: off")]
+    {
+        let with = |rest: &str| lit(splatting, (filter, 16, techniques), rest, &things());
         assert_layers_add_up(&with(""), &with("layers: [emission, direct, indirect, caustic]\n"));
     }
 }
