@@ -125,6 +125,24 @@ fn pixels_hold_there_what_they_hold_here() {
     }
 }
 
+/// Its numbers are linear Rec. 709, where ours are of another space: that of a red wall is 0.46 for the 0.47 of ACEScg. What is no red,
+/// green and blue has no such space.
+#[test]
+fn colours_of_another_space_are_told() {
+    let told_of = |output: &str| {
+        let (ours, exported, theirs) = there_and_back(&ball(&format!("output: {{{output}}}")), &[]);
+        assert_eq!(ours.output, theirs.output);
+        told(&exported)
+    };
+    let lost = ["output.colour: rec709: Mitsuba's film has no other red, green and blue"];
+    for colour in ["acescg", "aces2065-1", "rec2020", "p3", "xyz"] {
+        assert_eq!(told_of(&format!("colour: {colour}")), lost);
+    }
+    assert_eq!(told_of("colour: acescg, exr: {channels: rgb}"), lost);
+    assert_eq!(told_of("colour: rec709"), [""; 0]);
+    assert_eq!(told_of("colour: rec2020, exr: {channels: luminance}"), [""; 0]);
+}
+
 /// Mitsuba 3.9.1's `volpath` without depth has an empty picture, but alpha 1 where lamps that are not hidden are around it. Layers are
 /// told.
 #[test]

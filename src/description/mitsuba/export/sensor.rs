@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::super::super::camera::{Camera, Clip, FovAxis, Lens, Pose, Projection};
 use super::super::super::image::{Band, Filter, Image};
 use super::super::super::node::{Node, Value};
-use super::super::super::output::Channels;
+use super::super::super::output::{Channels, Colour};
 use super::spectra::can_be_band;
 use super::{Export, FILM, xml};
 
@@ -158,6 +158,7 @@ impl<'a> Export<'a> {
         }
         if bands.is_empty() {
             self.xml.value("string", "pixel_format", pixel_format(self.scene.output.exr.channels));
+            self.colour();
         }
         self.xml.value("string", "component_format", "float32");
         if *sample_border {
@@ -165,6 +166,19 @@ impl<'a> Export<'a> {
         }
         self.filter(*filter);
         self.xml.close();
+    }
+
+    /// Red, green and blue are those of Mitsuba.
+    fn colour(&mut self) {
+        let output = &self.scene.output;
+        match (output.exr.channels, output.colour) {
+            (Channels::Rgba | Channels::Rgb, Colour::Rec709) => {}
+            (Channels::Rgba | Channels::Rgb, _) => {
+                self.lose("output.colour", "rec709: Mitsuba's film has no other red, green and blue");
+            }
+            // What they hold is of no such space.
+            (Channels::Xyza | Channels::Xyz | Channels::LuminanceAlpha | Channels::Luminance, _) => {}
+        }
     }
 
     /// The bands of the film, where Mitsuba has words for all of them.
