@@ -121,10 +121,12 @@ fn a_checkpoint_of_a_picture_that_is_there_is_removed() {
     std::fs::write(&checkpoint, &left).unwrap();
     assert_eq!(run(&place, "a.exr", &["--spp", "8", "--skip-existing"]).code, 0);
     assert!(checkpoint.exists());
-    let told = "a.exr.checkpoint of an earlier render is there; --resume goes on from it";
+    let told =
+        "a.exr.checkpoint: it is of another picture: samples: expected 8, found 512; --resume does not go on from it";
     let quick = run(&place, "a.exr", &["--spp", "8"]);
     assert!(quick.code == 0 && quick.err.matches(told).count() == 1 && checkpoint.exists(), "{}", quick.err);
     // The picture that it would become is there.
+    let told = "a.exr.checkpoint of an earlier render is there; --resume goes on from it";
     let whole = run(&place, "a.exr", &["--spp", "512"]);
     assert!(whole.code == 0 && whole.err.matches(told).count() == 1 && !checkpoint.exists(), "{}", whole.err);
 }

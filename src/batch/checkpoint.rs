@@ -117,8 +117,11 @@ impl<'a> Keeper<'a> {
             return Begun::new(job, share);
         }
         if !self.keep.resume {
-            let told = format!("{} of an earlier render is there; --resume goes on from it", file.display());
-            self.watcher.warns(&told);
+            let of_it = part_file::open(&file).and_then(|w| w.header.check_begun(&file, self.identity, &share));
+            self.watcher.warns(&match of_it {
+                Ok(()) => format!("{} of an earlier render is there; --resume goes on from it", file.display()),
+                Err(error) => format!("{error}; --resume does not go on from it"),
+            });
             return Begun::new(job, share);
         }
         let written = part_file::open(&file)?;
