@@ -6,7 +6,7 @@
 //! On EXR files whose data window begins below 0 it ends. It mirrors what TGA files hold from right to left, and takes other colours from
 //! palettes in BMP, which it has for grey, and from `P6` of 16 bits.
 
-use super::decoded::{COLOURS, decode, decoder, extension, with_picture_first};
+use super::decoded::{COLOURS, decode, decoder, is_exr, with_picture_first};
 use super::{jpeg, pfm, radiance};
 use crate::description::{PictureAnew, PictureRead};
 use crate::film::exr::{self, ChannelData, ColourEncoding, Compression, ExrImage, ExrPart, Layout};
@@ -24,7 +24,7 @@ const TAKEN: [&[&str]; 3] = [&["R", "G", "B"], &["Y"], &["X", "Y", "Z"]];
 /// What Mitsuba makes of a picture file. One that cannot be read is left to it as it is.
 #[must_use]
 pub fn for_mitsuba(path: &Path) -> PictureRead {
-    let read = if extension(path) == "exr" { of_exr(path) } else { of_others(path) };
+    let read = if is_exr(path) { of_exr(path) } else { of_others(path) };
     read.unwrap_or(PictureRead { coloured: true, anew: None })
 }
 

@@ -8,7 +8,7 @@ use image::ImageDecoder;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 
@@ -95,7 +95,7 @@ pub struct Counted {
 /// [`Error::Input`] where there is no such file or it is no picture.
 pub fn open(path: &Path) -> Result<Decoded> {
     use image::ColorType::{L8, La8, Rgb8, Rgba8};
-    if extension(path) == "exr" {
+    if is_exr(path) {
         return exr::read_exr(path).map(with_picture_first).map(Decoded::Exr);
     }
     let decoded = decode(path)?;
@@ -105,6 +105,21 @@ pub fn open(path: &Path) -> Result<Decoded> {
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     Ok(Decoded::Bytes { rgb: decoded.into_rgb8().into_raw(), width, height, counted: None })
 }
+
+/// Whether a file is to be read as EXR: it begins as one, whatever it is called, or is called so and begins as nothing else.
+pub(super) fn is_exr(path: &Path) -> bool {
+    let mut first = Vec::new();
+    // A file that cannot be read says so to who reads it.
+    let _ = crate::input::open(path).and_then(|file| file.take(LONGEST_SIGNATURE).read_to_end(&mut first));
+    match image::guess_format(&first) {
+        Ok(image::ImageFormat::OpenExr) => true,
+        Ok(_) => false,
+        Err(_) => extension(path) == "exr" && !pfm::is(&first),
+    }
+}
+
+/// Bytes at the beginning of a file by which its kind is told: those of WebP and AVIF are twelve.
+const LONGEST_SIGNATURE: u64 = 16;
 
 /// The names of colours, and those that some writers give them.
 pub(super) const COLOURS: [[&str; 3]; 2] = [["R", "G", "B"], ["r", "g", "b"]];
@@ -296,6 +311,41 @@ mod tests {
         assert_eq!(red(vec![layer("sky.", 2.0), layer("sun.", 3.0)]), None);
         assert_eq!(red(vec![layer("V.DiffCol.", 2.0), depth(), layer("V.Combined.", 3.0)]), Some(3.0));
         assert_eq!(red(vec![depth()]), None);
+    }
+
+    /// A picture of any kind under the names of others, and under none.
+    #[test]
+    fn pictures_are_known_by_how_they_begin() {
+        let dir = tempfile::tempdir().unwrap();
+        let png = dir.path().join("a.png");
+        image::RgbImage::from_pixel(1, 1, image::Rgb([7, 7, 7])).save(&png).unwrap();
+        let exr = dir.path().join("a.exr");
+        let image = exr::ExrImage {
+            frame: [1, 1],
+            window: Window::full(1, 1),
+            channels: vec![("Y".to_owned(), exr::ChannelData::F32(vec![0.5]))],
+            colour: None,
+            attributes: Vec::new(),
+            data: std::collections::BTreeSet::new(),
+            compression: exr::Compression::None,
+            layout: exr::Layout::Single,
+        };
+        exr::write_exr(&exr, &image).unwrap();
+        let pfm = b"Pf\n1 1\n-1\n\0\0\0\x3f".to_vec();
+        let [png, exr] = [png, exr].map(|path| std::fs::read(path).unwrap());
+        for name in ["b.exr", "b.EXR", "b.png", "b.jpg", "b.tif", "b"] {
+            let path = dir.path().join(name);
+            let read = |bytes: &[u8]| {
+                std::fs::write(&path, bytes).unwrap();
+                open(&path).unwrap_or_else(|error| panic!("{error}"))
+            };
+            assert!(matches!(read(&exr), Decoded::Exr(_)), "{name}");
+            assert!(matches!(read(&png), Decoded::Bytes { .. }), "{name}");
+            assert!(matches!(read(&pfm), Decoded::Other(_)), "{name}");
+        }
+        let path = dir.path().join("c.exr");
+        std::fs::write(&path, "no picture").unwrap();
+        assert!(open(&path).unwrap_err().to_string().contains("not a valid OpenEXR file"));
     }
 
     /// One of 2 x 1 pixels in four bytes each: 0.5 and, half as bright, 0.25, under both signatures.
