@@ -13,7 +13,14 @@ import io
 import json
 from pathlib import Path
 
-from PIL import Image, ImageDraw, ImageFont
+# Before what has to be installed, which who asks for help need not have.
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("pictures", type=Path, help="directory of the PNG files and report.json")
+parser.add_argument("output", type=Path, help="the sheet, JPEG")
+parser.add_argument("--kib", type=float, default=250, help="largest size of the file")
+arguments = parser.parse_args()
+
+from PIL import Image, ImageDraw, ImageFont  # noqa: E402
 
 WIDTH = 1400
 GAP = 4
@@ -67,11 +74,6 @@ def sheet(pictures):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("pictures", type=Path, help="directory of the PNG files and report.json")
-    parser.add_argument("output", type=Path, help="the sheet, JPEG")
-    parser.add_argument("--kib", type=float, default=250, help="largest size of the file")
-    arguments = parser.parse_args()
     report = json.loads((arguments.pictures / "report.json").read_text())
     names = [scene["name"] for scene in report["scenes"]]
     out = sheet([(name, Image.open(arguments.pictures / f"{name}.png").convert("RGB")) for name in names])

@@ -8,11 +8,18 @@
 
 What is written has the windows, the colours and the alpha of what was read: R, G, B, or X, Y, Z, or Y.
 """
+import argparse
 import sys
 
-import numpy as np
-import OpenEXR
-import pyoidn
+# Before what has to be installed, which who asks for help need not have.
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("noisy", help="the picture, EXR")
+parser.add_argument("denoised", help="where the result is written, EXR")
+arguments = parser.parse_args()
+
+import numpy as np  # noqa: E402
+import OpenEXR  # noqa: E402
+import pyoidn  # noqa: E402
 
 # What the denoised file has of its own; `abbe/...` speaks of the pixels that were rendered.
 OWN = {"acesImageContainerFlag", "channels", "chunkCount", "compression", "dwaCompressionLevel", "lineOrder", "name", "type"}
@@ -24,10 +31,10 @@ def letters(channels, layer, choices):
         if all(layer + letter in channels for letter in choice):
             return [layer + letter for letter in choice]
     expected = " or ".join(", ".join(layer + letter for letter in choice) for choice in choices)
-    sys.exit(f"{sys.argv[1]}: expected channels {expected}; found {', '.join(channels)}")
+    sys.exit(f"{arguments.noisy}: expected channels {expected}; found {', '.join(channels)}")
 
 
-with OpenEXR.File(sys.argv[1], separate_channels=True) as file:
+with OpenEXR.File(arguments.noisy, separate_channels=True) as file:
     parts = [(dict(part.header), {name: channel.pixels for name, channel in part.channels.items()}) for part in file.parts]
 channels = {name: pixels for _, part in reversed(parts) for name, pixels in part.items()}
 names = {
@@ -56,4 +63,4 @@ header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage
 written = {name: np.ascontiguousarray(output[..., i]) for i, name in enumerate(names["color"])}
 if "A" in channels:
     written["A"] = channels["A"]
-OpenEXR.File(header, written).write(sys.argv[2])
+OpenEXR.File(header, written).write(arguments.denoised)

@@ -6,6 +6,7 @@ A heap of balls with a flat base, worn at the edges by five octaves of value noi
 a hash, so the file is the same everywhere. Format: src/scene/grid.rs.
 """
 
+import argparse
 import math
 import struct
 from pathlib import Path
@@ -55,6 +56,7 @@ def density(x: float, y: float, z: float) -> float:
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     nx, ny, nz = SIZE
     values = [
         density((x + 0.5) / nx, (y + 0.5) / ny, (z + 0.5) / nz) for z in range(nz) for y in range(ny) for x in range(nx)

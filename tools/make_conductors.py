@@ -8,9 +8,8 @@ collected in the luxpop.com database (those whose name ends in _palik are from P
 Solids). Kept are the samples within 360 to 830 nm and the next one beyond each end, so that linear interpolation gives the
 same numbers.
 """
+import argparse
 from pathlib import Path
-
-import mitsuba
 
 BAND = (360.0, 830.0)
 OUT = Path(__file__).resolve().parents[1] / "src/description/mitsuba/data/conductors.txt"
@@ -28,6 +27,9 @@ def cut(pairs):
 
 
 def main():
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    import mitsuba
+
     folder = Path(mitsuba.__file__).parent / "data" / "ior"
     lines = [
         f"# Optical constants by the names of Mitsuba {mitsuba.__version__}: measurements of the luxpop.com database, and of",

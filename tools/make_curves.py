@@ -8,6 +8,7 @@ plies turn about it. The ball is a shell of the gyroid sin x cos y + sin y cos z
 signed distances (to first order: value over slope) on a grid. Needs nothing but Python.
 """
 
+import argparse
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from struct import pack
@@ -73,6 +74,7 @@ def ball(n=36, waves=2.25, thickness=0.035, radius=0.47):
     return header + pack(f"<{n**3}f", *values)
 
 
+argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
 FOLDER.mkdir(exist_ok=True)
 (FOLDER / "knit.txt").write_text(knit())
 (FOLDER / "ball.vol").write_bytes(ball())

@@ -11,8 +11,13 @@ where it fell and is stirred by the wind. Both are sums of value noise looked up
 import argparse
 import os
 
-import numpy as np
-from PIL import Image
+# Before what has to be installed, which who asks for help need not have.
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("--out", default="configs/films")
+arguments = parser.parse_args()
+
+import numpy as np  # noqa: E402
+from PIL import Image  # noqa: E402
 
 
 def smooth(t):
@@ -83,9 +88,7 @@ def write(path, values, bits=16):
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("--out", default="configs/films")
-    out = arguments.parse_args().out
+    out = arguments.out
     os.makedirs(out, exist_ok=True)
     write(os.path.join(out, "soap.png"), soap(np.random.default_rng(11), 320, 160))
     write(os.path.join(out, "oil.png"), oil(np.random.default_rng(5), 256, 256))

