@@ -162,7 +162,7 @@
 //!   clay:
 //!     diffuse:
 //!       reflectance: {texture: floor}            # spectrum or texture, 0 to 1; ~ 0.5
-//!       highlight: {strength: 0.5, exponent: 50, model: blinn}   # whitted only; blinn, phong; ~ none
+//!       highlight: {strength: 0.5, exponent: 50, model: blinn}   # whitted only; ~ none; of its fields ~ all; blinn, phong
 //!       two_sided: true                          # ~
 //!   ring:
 //!     conductor:
