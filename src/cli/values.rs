@@ -55,11 +55,7 @@ pub(super) fn path_map(text: &str) -> Parsed<String> {
 
 /// A relative error, or per cent.
 pub(super) fn relative_error(text: &str) -> Parsed<f64> {
-    let (number, unit) = match text.trim().strip_suffix('%') {
-        Some(number) => (number.trim(), 0.01),
-        None => (text.trim(), 1.0),
-    };
-    let share = number.parse::<f64>().ok().map(|x| x * unit).filter(|x| *x > 0.0 && *x < 1.0);
+    let share = description::share(text).filter(|x| *x > 0.0 && *x < 1.0);
     share.ok_or_else(|| "expected an error above 0 and below 1, as 0.01 or 1%".into())
 }
 

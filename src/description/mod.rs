@@ -93,7 +93,7 @@
 //!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel
-//!   stop: {error: ~, time: ~, samples: ~}       # the first that is reached ends the render: relative RMSE of the picture,
+//!   stop: {error: ~, time: ~, samples: ~}       # the first that is reached ends the render: relative RMSE of the picture (0.01, 1%),
 //!                                   # wall time of rendering (60, 90s, 10m, 2h), paths per pixel (65536 where another
 //!                                   # is given, 256 of a picture that stays black where error alone is);
 //!                                   # without any: after `samples`, for which techniques are planned anyway
@@ -557,6 +557,7 @@ pub use scene::{DEFAULT_GROUP, Locator, SceneDescription};
 pub use settings::{
     Coverage, DepthIntegrator, Effects, Integrator, LightTracerIntegrator, MOST_SAMPLES, NoIntegrator, PathIntegrator,
     Render, SAMPLES_LIMIT, ShadowRays, Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,
+    share,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use serde::Deserialize;
+use serde::de::{Error, Unexpected};
+use serde::{Deserialize, Deserializer};
 
 use super::decode::{whole, whole_or_none};
 use super::fault::Checker;
@@ -245,7 +246,8 @@ impl Default for Render {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stop {
-    /// Relative RMSE of the picture.
+    /// Relative RMSE of the picture; also as `1%`.
+    #[serde(default, deserialize_with = "share_or_none")]
     pub error: Option<f64>,
     /// Wall time of rendering.
     pub time: Option<Time>,
@@ -267,6 +269,36 @@ impl Render {
         let open = self.stop.error.is_some() || self.stop.time.is_some();
         self.stop.samples.unwrap_or(if open { MOST_SAMPLES } else { self.samples })
     }
+}
+
+/// What a share is to be.
+const SHARE: &str = "a number above 0 and below 1 (1 % is 0.01)";
+
+/// For `deserialize_with`: a number, or per cent.
+fn share_or_none<'de, D: Deserializer<'de>>(de: D) -> Result<Option<f64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Written {
+        Number(f64),
+        Text(String),
+    }
+    match Written::deserialize(de)? {
+        Written::Number(share) => Ok(Some(share)),
+        Written::Text(text) => {
+            let wrong = || D::Error::invalid_value(Unexpected::Str(&text), &SHARE);
+            share(&text).map(Some).ok_or_else(wrong)
+        }
+    }
+}
+
+/// The share of `0.01` or `1%`.
+#[must_use]
+pub fn share(text: &str) -> Option<f64> {
+    let (number, unit) = match text.trim().strip_suffix('%') {
+        Some(number) => (number.trim(), 0.01),
+        None => (text.trim(), 1.0),
+    };
+    number.parse::<f64>().ok().map(|x| x * unit)
 }
 
 /// A time: seconds, or `90s`, `10m`, `2h`.
@@ -447,7 +479,7 @@ impl Render {
         if let Some(error) = self.stop.error {
             // A share of the light: 4 was meant for 4 %.
             let is_share = error > 0.0 && error < 1.0;
-            checker.require(is_share, stop.key("error"), "a number above 0 and below 1 (1 % is 0.01)", error);
+            checker.require(is_share, stop.key("error"), SHARE, error);
         }
         if let Some(time) = &self.stop.time {
             let found = match time {
@@ -529,7 +561,24 @@ mod tests {
             faults("render: {stop: {error: 1}}"),
             "dir/s.yaml:2:24: render.stop.error: expected a number above 0 and below 1 (1 % is 0.01), found 1"
         );
+        for wrong in ["1 part", "one%"] {
+            assert_eq!(
+                faults(&format!("render: {{stop: {{error: {wrong}}}}}")),
+                format!(
+                    "dir/s.yaml:2:24: render.stop.error: expected a number above 0 and below 1 (1 % is 0.01), \
+                     found the text \"{wrong}\""
+                )
+            );
+        }
+        assert_eq!(
+            faults("render: {stop: {error: 150%}}"),
+            "dir/s.yaml:2:24: render.stop.error: expected a number above 0 and below 1 (1 % is 0.01), found 1.5"
+        );
         let render = |text: &str| scene(&format!("render: {text}")).render;
+        for one in ["0.01", "1%", "'1 %'", "'0.01'"] {
+            assert_eq!(render(&format!("{{stop: {{error: {one}}}}}")).stop.error, Some(0.01), "{one}");
+        }
+        assert_eq!(render("{stop: {error: null, time: 1}}").stop.error, None);
         let stop = render("{stop: {time: 2m}}");
         assert_eq!(stop.stop.time.clone().unwrap().duration(), Some(Duration::from_secs(120)));
         assert_eq!(duration("0"), Some(Duration::ZERO));
