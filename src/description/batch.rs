@@ -232,10 +232,14 @@ impl Batch {
         for (i, (entry, node)) in written.scenes.into_iter().zip(nodes).enumerate() {
             let list = At::ROOT.key("scenes");
             let at = list.index(i);
+            // `name:` without a value is not written.
+            let (name_at, expected) = match &entry.name {
+                Some(_) => (at.key("name"), "a name that can be a file name"),
+                None => (at.key("file"), "one file, no pattern, in whose name is none of / \\ : * ? \" < > |"),
+            };
             let name = entry.name.or_else(|| stem(&entry.file)).unwrap_or_default();
             let name_node = node.get("name").or(node.get("file")).unwrap_or(node);
-            let name_at = if node.get("name").is_some() { at.key("name") } else { at.key("file") };
-            check_name(&name, name_at, &mut checker);
+            checker.require(can_be_a_file_name(&name), name_at, expected, quote(&name));
             if let Some(first) = names.insert(name.clone(), name_node.place) {
                 let (name, first) = (quote(&name), sources.describe(first));
                 checker.fault(
@@ -280,12 +284,11 @@ impl Batch {
 }
 
 /// A name becomes part of file names.
-fn check_name(name: &str, at: At<'_>, checker: &mut Checker<'_>) {
-    let usable = !name.is_empty()
+fn can_be_a_file_name(name: &str) -> bool {
+    !name.is_empty()
         && name != "."
         && name != ".."
-        && !name.contains(|c: char| c.is_control() || "/\\:*?\"<>|".contains(c));
-    checker.require(usable, at, "a name that can be a file name", quote(name));
+        && !name.contains(|c: char| c.is_control() || "/\\:*?\"<>|".contains(c))
 }
 
 impl BatchEntry {
@@ -553,6 +556,16 @@ mod tests {
              DIR/batch.yaml:4:24: scenes[2].name: expected a name that can be a file name, found \"b/c\"\n\
              DIR/batch.yaml:5:24: scenes[3].name: expected a name that can be a file name, found \"..\""
         );
+        // Of a file the name is the output's, too.
+        for (file, stem) in [("sub/*.yaml", "*"), ("sub/a?.yaml", "a?"), ("sub\\s.yaml", "sub\\\\s")] {
+            assert_eq!(
+                refusal(&format!("scenes:\n- file: {file}\n")),
+                format!(
+                    "DIR/batch.yaml:2:9: scenes[0].file: expected one file, no pattern, in whose name is none of \
+                     / \\ : * ? \" < > |, found \"{stem}\""
+                )
+            );
+        }
     }
 
     #[test]
