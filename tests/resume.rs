@@ -575,6 +575,14 @@ fn a_finished_picture_needs_no_room_to_be_found() {
     std::fs::create_dir(place.path("o/a.exr.checkpoint")).unwrap();
     let ran = run(&place, "o/a.exr", &[]);
     assert!(ran.code == 1 && ran.err.contains("a.exr.checkpoint"), "{} {}", ran.code, ran.err);
+    let rendered = place.json("o/report.json")["scenes"][0].take();
     assert_eq!(run(&place, "o/a.exr", &["--skip-existing"]).code, 0);
-    assert_eq!(place.json("o/report.json")["scenes"][0]["status"], "skipped");
+    let skipped = place.json("o/report.json")["scenes"][0].take();
+    assert_eq!(skipped["status"], "skipped");
+    // Its header says all of it.
+    for (group, figure) in [("seconds", "rendering"), ("error", "rel_rmse"), ("error", "low"), ("error", "high")] {
+        assert_eq!(rendered[group][figure], skipped[group][figure], "{group}.{figure}");
+    }
+    let [rate, again] = [&rendered, &skipped].map(|scene| scene["msamples_per_second"].as_f64().unwrap());
+    assert!(rate > 0.0 && (again / rate - 1.0).abs() < 1e-6, "{rate} {again}");
 }

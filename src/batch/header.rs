@@ -92,7 +92,7 @@ pub(super) fn attributes(
         all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
         let state = if e.valid { "valid" } else { "not converged, interval not valid" };
         all.push(("abbe/relativeErrorState".to_owned(), text(state)));
-        all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:.3e} {:.3e}", e.low, e.high))));
+        all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:e} {:e}", e.low, e.high))));
     }
     if let Some(fault) = &report.fault {
         all.push((FAULT.to_owned(), text(fault)));

@@ -207,6 +207,11 @@ pub struct SceneReport {
     pub fault: Option<String>,
 }
 
+/// Million samples a second.
+fn msamples_per_second(samples: f64, seconds: f64) -> f64 {
+    samples / seconds.max(1e-9) * 1e-6
+}
+
 /// What `serde` does for an [`Arc`] only with its feature `rc`.
 fn shared<S: Serializer>(effects: &Arc<[Effect]>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(effects.iter())
@@ -349,7 +354,7 @@ impl SceneReport {
         let (counted, dropped) = frame.film.samples();
         self.seconds.rendering = seconds;
         self.samples = frame.samples();
-        self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
+        self.msamples_per_second = msamples_per_second((counted + dropped) as f64, seconds);
         self.invalid = frame.invalid();
         self.adaptive = finish.adaptive.map(|_| SampleCounts::of(&frame.film));
         self.numerics = numerics;
@@ -385,7 +390,12 @@ impl SceneReport {
         let header = &headers.parts[0];
         self.samples = header.number("abbe/samples").map_or(self.samples, |samples| samples as u32);
         self.adaptive = header.text("abbe/adaptiveSamples").and_then(SampleCounts::read);
-        self.seconds.rendering = header.number("abbe/renderSeconds").unwrap_or(0.0);
+        let pixels = finish.window.pixels() as u64;
+        if let Some(seconds) = header.number("abbe/renderSeconds") {
+            let each = self.adaptive.map_or(f64::from(self.samples), |counts| counts.mean);
+            self.seconds.rendering = seconds;
+            self.msamples_per_second = msamples_per_second(each * pixels as f64, seconds);
+        }
         self.pixel_hash = header.text("abbe/pixelHash").unwrap_or_default().to_owned();
         self.halving_seconds = header.number("abbe/secondsToHalveError");
         let causes: Vec<u64> = header
@@ -398,7 +408,6 @@ impl SceneReport {
         let ends: Vec<f64> = interval.split(' ').filter_map(|end| end.parse().ok()).collect();
         if let (Some(rel_rmse), [low, high]) = (header.number("abbe/relativeError"), ends.as_slice()) {
             let valid = header.text("abbe/relativeErrorState") == Some("valid");
-            let pixels = finish.window.pixels() as u64;
             self.error = Some(ErrorEstimate { rel_rmse, low: *low, high: *high, pixels, valid });
         }
     }
@@ -407,7 +416,7 @@ impl SceneReport {
     pub fn measure_part(&mut self, begun: &Begun, numerics: Option<Counts>) {
         let seconds = begun.elapsed.as_secs_f64();
         self.seconds.rendering = seconds;
-        self.msamples_per_second = begun.part.progress().1 as f64 / seconds.max(1e-9) * 1e-6;
+        self.msamples_per_second = msamples_per_second(begun.part.progress().1 as f64, seconds);
         self.invalid = begun.part.look(frame::invalid);
         self.numerics = numerics;
     }
