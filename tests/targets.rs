@@ -264,6 +264,11 @@ fn against_a_closed_form_the_sheet_finds_the_bias_that_is_there() {
             assert!(bias.abs() < 4.0 * error, "{row}");
         }
     }
+    // What a reference would have in samples is said of one alone.
+    let page = || std::fs::read_to_string(place.path("sheet/accuracy.html")).unwrap();
+    assert!(page().contains("<figcaption>no bound to depth</figcaption>"));
+    assert_eq!(abbe(&place, "accuracy scene.yaml -o sheet --rounds 1 --knob samples --spp 16").0, 0);
+    assert!(page().contains("<figcaption>no bound to depth, sixteen times the samples</figcaption>"));
     assert_eq!(abbe(&place, "accuracy scene.yaml --truth 0").0, 2);
 }
 

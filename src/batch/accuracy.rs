@@ -64,6 +64,11 @@ impl Settings<'_> {
     fn moves(&self, knob: &str) -> bool {
         self.knobs.is_empty() || self.knobs.iter().any(|name| name == knob)
     }
+
+    /// How many times the samples the picture without a bound to depth has: against the truth it is only looked at.
+    fn times_as_many(&self) -> u32 {
+        if self.truth.is_some() { 1 } else { REFERENCE }
+    }
 }
 
 /// See [`Settings::time`].
@@ -189,7 +194,7 @@ pub fn sheet(
         done += 1;
     };
     tell("reference");
-    let more = samples.saturating_mul(REFERENCE);
+    let more = samples.saturating_mul(settings.times_as_many());
     let seed = chosen.description.render.seed;
     let full = desk.render(&full_setting(more), seed ^ SEED_OF_THE_REFERENCE, None)?;
     let reference = match settings.truth {

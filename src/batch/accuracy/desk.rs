@@ -2,7 +2,7 @@
 
 use super::figures::{Reference, Replicates};
 use super::knobs::{self, Trial, Way};
-use super::{FEWEST, REFERENCE, Settings};
+use super::{FEWEST, Settings};
 use crate::batch::frame::{self, FrameJob, pass_end};
 use crate::batch::part::{Part, Share, SplatFilm};
 use crate::batch::prepare::prepare_scene;
@@ -75,7 +75,7 @@ impl<'a> Desk<'a> {
         let work: f64 = trials.iter().map(Trial::work).sum();
         let rounds = f64::from(settings.rounds.max(1));
         let left = time.saturating_sub(ready.mul_f64(rounds * trials.len() as f64)).as_secs_f64();
-        let samples = left / (each * (rounds * work + f64::from(REFERENCE)));
+        let samples = left / (each * (rounds * work + f64::from(settings.times_as_many())));
         Ok(1 << (samples.clamp(f64::from(FEWEST), f64::from(settings.samples)) as u32).ilog2())
     }
 

@@ -126,9 +126,10 @@ fn section(out: &mut String, number: usize, sheet: &Sheet) {
         out.push_str("</tr>\n");
     }
     out.push_str("</tbody></table>\n<h3>How it looks</h3>\n<div class=\"crops\">\n");
+    let samples = sheet.reference.map_or("", |_| ", sixteen times the samples");
     let _ = writeln!(
         out,
-        "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>no bound to depth, sixteen times the samples</figcaption></figure>",
+        "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>no bound to depth{samples}</figcaption></figure>",
         base64(&sheet.png)
     );
     for row in sheet.rows.iter().filter(|row| row.knob != "file") {
