@@ -216,7 +216,11 @@ impl RefractiveIndex {
                 && samples.last().is_some_and(|s| s[0] >= BAND_NM[1]);
             if !covers {
                 let range = match (samples.first(), samples.last()) {
-                    (Some(a), Some(b)) => format!("{} to {} nm", in_short(a[0]), in_short(b[0])),
+                    (Some(a), Some(b)) => {
+                        let in_um = a[0] * 1e3 <= BAND_NM[1] && b[0] * 1e3 >= BAND_NM[0];
+                        let hint = if in_um { " (are they in µm?)" } else { "" };
+                        format!("{} to {} nm{hint}", in_short(a[0]), in_short(b[0]))
+                    }
                     _ => "no samples".to_string(),
                 };
                 return Err(format!("expected a table of 360 to 830 nm, found {range}"));
@@ -437,7 +441,9 @@ mod tests {
         let negative = RefractiveIndex::Sellmeier { b: [-3.0, 0.0, 0.0], c: [0.01, 0.0, 0.0] };
         assert!(negative.check_band().unwrap_err().contains("negative square"));
         let short = RefractiveIndex::Table { samples: vec![[400.0, 1.5], [700.0, 1.5]] };
-        assert!(short.check_band().unwrap_err().contains("400 to 700 nm"));
+        assert!(short.check_band().unwrap_err().ends_with("400 to 700 nm"));
+        let micrometres = RefractiveIndex::Table { samples: vec![[0.4, 1.5], [0.7, 1.5]] };
+        assert!(micrometres.check_band().unwrap_err().ends_with("found 0.4 to 0.7 nm (are they in µm?)"));
         let disorder = RefractiveIndex::Table { samples: vec![[300.0, 1.5], [300.0, 1.5], [900.0, 1.5]] };
         assert!(disorder.check_band().unwrap_err().contains("ascending"));
         assert!(RefractiveIndex::Table { samples: vec![] }.check_band().unwrap_err().contains("no samples"));
