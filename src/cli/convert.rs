@@ -53,6 +53,9 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
 /// The one scene that is asked for, of other files than the one that is to be written, and those files. Its notes are told.
 fn read(arguments: &ConvertArguments) -> Result<(SceneDescription, Inputs)> {
     let file = &arguments.scene.file;
+    if arguments.output.as_deref() == Some(Path::new("-")) {
+        return Err(Error::Config("-o -: expected the name of a file; without -o the scene is printed".into()));
+    }
     let overrides = arguments.scene.overrides(None)?;
     match &batch::entries(file, &overrides)?[..] {
         [entry] => {

@@ -76,6 +76,14 @@ fn scenes_are_chosen_by_name() {
         "error: -o one.PNG: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
     assert_eq!((ran.code, ran.err.as_str()), (2, expected));
     assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.other.json"]);
+    // What many programs take for the standard output made a directory of that name.
+    let ran = place.run(&["render", "scenes/good.yaml", "-o", "-"]);
+    let expected = "error: -o -: expected a directory or a file name, for a picture is several files; found the standard \
+                    output (a directory of this name is ./-)\n";
+    assert_eq!((ran.code, ran.err.as_str(), place.path("-").exists()), (2, expected, false));
+    let ran = place.run(&["export", "scenes/good.yaml", "-o", "-"]);
+    let expected = "error: -o -: expected the name of a file; without -o the scene is printed\n";
+    assert_eq!((ran.code, ran.err.as_str(), place.path("-").exists()), (2, expected, false));
     // A name that ends in a slash is a directory, whatever else it ends in.
     assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "new.exr/"]).code, 0);
     assert_eq!(place.names("new.exr"), ["good.exr", "good.png", "report.json"]);
