@@ -123,18 +123,18 @@ pub(crate) fn read_tables(root: &mut Node, sources: &mut Sources) -> Result<bool
     unreadable.map_or(Ok(found), Err)
 }
 
-/// The rows `[frame, value]` of a file of numbers with commas between them; a value of several numbers is a list. Empty
-/// lines and those that begin with # say nothing, nor does a first line of names, which a row with other separators is not.
+/// The rows `[frame, value]` of a file of numbers with commas, semicolons or blanks between them; a value of several numbers is a
+/// list. Empty lines and those that begin with # say nothing, nor does a first line of names.
 fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
     let bytes = read_bytes(path).map_err(|error| format!("cannot be read: {error}"))?;
     let text = str::from_utf8(crate::input::without_mark(&bytes)).map_err(|_| "expected text in UTF-8".to_owned())?;
     let source = sources.add_file(path);
     let (mut rows, mut has_names) = (Vec::new(), false);
     for (line, text) in (1..).zip(text.lines()) {
-        let fields: Vec<&str> = text.split(',').map(str::trim).collect();
-        if fields[0].starts_with('#') || fields == [""] {
+        if text.trim().is_empty() || text.trim_start().starts_with('#') {
             continue;
         }
+        let fields = fields(text);
         let place = Place { source, line, column: 1 };
         let numbers: Option<Vec<Node>> = fields
             .iter()
@@ -160,15 +160,26 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
                 let before = &text[..at.as_ptr() as usize - text.as_ptr() as usize];
                 let column = before.chars().count() + 1;
                 return Err(format!(
-                    "line {line}, column {column}: expected a frame and one number or more, with commas, found {found}"
+                    "line {line}, column {column}: expected a frame and one number or more, with commas, semicolons or \
+                     blanks, found {found}"
                 ));
             }
         }
     }
     if rows.is_empty() {
-        return Err("expected lines of a frame and one number or more, with commas, found none".to_owned());
+        return Err("expected lines of a frame and one number or more, with commas, semicolons or blanks, found none"
+            .to_owned());
     }
     Ok(rows)
+}
+
+/// What stands between the separators of `line`: semicolons where it has any, else commas, else blanks. So a comma beside semicolons is
+/// that of a decimal fraction, which is no number here, and separates nothing.
+fn fields(line: &str) -> Vec<&str> {
+    match [';', ','].into_iter().find(|separator| line.contains(*separator)) {
+        Some(separator) => line.split(separator).map(str::trim).collect(),
+        None => line.split_whitespace().collect(),
+    }
 }
 
 /// Whether the first word of `line` is a number, whatever separates words.
@@ -608,14 +619,19 @@ mod tests {
         let Geometry::Sphere(sphere) = &read.shapes[0].geometry else { panic!("a sphere") };
         assert_eq!(sphere.center, [2.0, 2.0, 2.0]);
         let says = |table: &str| scene(&[("s.yaml", &text), ("p.csv", table)]).unwrap_err();
-        let line = "expected a frame and one number or more, with commas, found";
+        let line = "expected a frame and one number or more, with commas, semicolons or blanks, found";
         let named = "it is named at DIR/s.yaml:4:45";
         assert_eq!(says("1, 2, 3, 4\n2, a\n"), format!("DIR/p.csv: line 2, column 4: {line} \"2, a\"; {named}"));
         assert_eq!(says("1\n"), format!("DIR/p.csv: line 1, column 1: {line} \"1\"; {named}"));
-        // One line of names may stand first, but no row with other separators: the value of frame 1 would be lost.
-        for row in ["1;2;3;4", "1 2 3 4", "1.5\t2"] {
-            let quoted = row.replace('\t', "\\t");
-            let told = format!("DIR/p.csv: line 1, column 1: {line} \"{quoted}\"; {named}");
+        for separator in [";", "; ", " ", "  ", "\t", ","] {
+            let table = table.replace(", ", separator);
+            let again = scene(&[("s.yaml", &text), ("p.csv", &table)]).unwrap();
+            assert_eq!(again.shapes[0].geometry, read.shapes[0].geometry, "{separator:?}");
+        }
+        // A comma of a decimal fraction separates nothing, and a first row with one is no line of names: the value of frame 1 would be
+        // lost.
+        for (row, column) in [("1;2,5;3;4", 3), ("1 2,5 3 4", 1), ("1;2 3;4", 3), ("1 a,b", 1)] {
+            let told = format!("DIR/p.csv: line 1, column {column}: {line} \"{row}\"; {named}");
             assert_eq!(says(&format!("{row}\n20, 4, 5, 6\n")), told);
         }
         assert_eq!(says("frame;x\nt;y\n3, 4\n"), format!("DIR/p.csv: line 2, column 1: {line} \"t;y\"; {named}"));
@@ -627,7 +643,7 @@ mod tests {
             let message = format!("{place}.{key}: expected file alone, found \"{key}\"{beside}");
             assert_eq!(scene(&[("s.yaml", &text), ("p.csv", table)]).unwrap_err(), message);
         }
-        let empty = "expected lines of a frame and one number or more, with commas, found none";
+        let empty = "expected lines of a frame and one number or more, with commas, semicolons or blanks, found none";
         assert_eq!(says("# frame, x, y, z\n"), format!("DIR/p.csv: {empty}; {named}"));
         assert_eq!(
             says("1, 2, 3, 4\n2, 5\n"),

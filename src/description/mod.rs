@@ -362,7 +362,7 @@
 //! - {0: 1.0, 48: 2.5}                                     # straight from key to key; 1.0 before, 2.5 after
 //! - {0: 1, 24: 3, 48: 2.5, interpolation: smooth}         # ~ linear; smooth, step
 //! - {keys: [[0, 1.0], [48, 2.5]]}                         # the same as a table; and interpolation
-//! - {keys: {file: radius.csv}}                            # the same in a file: frame and value, or values
+//! - {keys: {file: radius.csv}}                            # the same in a file: frame and value, or values, with commas, semicolons or blanks
 //! ```
 //! So a camera moves (`origin: {0: [0, 1, 5], 100: [2, 1, 5]}`), a lamp fades, a shape turns
 //! (`rotate: {axis: [0, 1, 0], deg: {0: 0, 100: 360}}`). Lists run number by number: a matrix between two turned ones is no
