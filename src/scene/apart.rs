@@ -57,8 +57,8 @@ pub(super) struct Contact {
     pub(super) body: u32,
     /// What it touches.
     pub(super) other: u32,
-    /// By how much it was put off, metres; negative where it reaches into the other. None where it has no room: a sheet, or a mesh
-    /// between two others.
+    /// By how much it was put off, metres; negative where it reaches into the other. None where it has no room: a sheet, a mesh
+    /// between two others, or what is thinner than some 2⁻³¹ of its coordinates.
     pub(super) by: Option<f64>,
     /// Whether both have a priority and should overlap, but one of them had to leave something else.
     pub(super) parted: bool,
