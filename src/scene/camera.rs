@@ -36,6 +36,9 @@ struct View {
     /// The axis in the world, as long as the matrix makes it, and of unit length.
     axis: DVec3,
     unit_axis: DVec3,
+    /// Of a point off the camera, how far along the axis the plane of its depth is: across the camera's x and y, so the unit axis,
+    /// but where a matrix shears.
+    depth: DVec3,
     /// Where the axis meets the near clipping plane.
     near: DVec3,
     /// The clipping planes in units of the camera, which a matrix may make as long as the axis.
@@ -135,17 +138,19 @@ impl Camera {
         let local_clip = clip.map(|distance| distance / axis_length);
         let lens = lens.filter(|lens| lens.radius > 0.0);
         let (radius, focus_distance) = lens.map_or((0.0, axis_length), |lens| (lens.radius, lens.focus_distance));
+        let camera_from_world = world_from_camera.inverse();
         let view = View {
             middle: (DVec2::splat(0.5) + principal_point) * size,
             right: m.x_axis * side,
             down: m.y_axis * -side,
             axis: m.z_axis,
             unit_axis: m.z_axis.normalize(),
+            depth: camera_from_world.matrix3.row(2) * axis_length,
             near: world_from_camera.translation + m.z_axis * local_clip[0],
             clip: local_clip,
             aperture: radius / DVec2::new(m.x_axis.length(), m.y_axis.length()),
             focus: focus_distance / axis_length,
-            camera_from_world: world_from_camera.inverse(),
+            camera_from_world,
         };
         Camera { world_from_camera, projection, resolution, lens, clip, principal_point, view }
     }
@@ -217,14 +222,14 @@ impl Camera {
         (to_world.transform_point3(origin), to_world.transform_vector3(direction).normalize())
     }
 
-    /// How far along one of the camera's rays it sees, metres.
+    /// How far along one of the camera's rays it sees, metres: to the far clipping plane.
     #[must_use]
     #[inline]
     pub fn reach(&self, ray: &Ray) -> f64 {
         if self.clip[1] == f64::INFINITY {
             return f64::INFINITY;
         }
-        (self.clip[1] - self.clip[0]) / ray.direction.dot(self.view.unit_axis)
+        (self.clip[1] - self.clip[0]) / ray.direction.dot(self.view.depth)
     }
 
     /// How light from `point` enters the camera through the point `lens` of the unit square of its lens; `None` where
@@ -347,16 +352,19 @@ impl Camera {
         Some([middle.x, middle.y, width].map(|x| x as f32))
     }
 
-    /// Distance of `point` along the axis, metres, whatever the scale of the camera's own coordinates.
+    /// Distance of `point` along the axis, metres, whatever the scale of the camera's own coordinates: the same all over a plane of
+    /// its x and y, as the clipping planes are.
     #[must_use]
     pub fn depth(&self, point: DVec3) -> f64 {
-        (point - self.world_from_camera.translation).dot(self.view.unit_axis)
+        (point - self.world_from_camera.translation).dot(self.view.depth)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DMat3;
+    use std::f64::consts::SQRT_2;
 
     fn camera(lens: Option<Lens>) -> Camera {
         clipped(lens, 0.0)
@@ -431,6 +439,31 @@ mod tests {
             }
             // The outermost of the 64 places.
             assert!((0.4..=0.5).contains(&widest), "{x} {y} {z}: {widest}");
+        }
+    }
+
+    /// A camera that looks down and leans by 45°: its axis is √2 m long for each metre down, so what is n metres below it has a depth
+    /// of n √2 m, wherever it is in the picture and however a lens slants the ray; and so have the clipping planes, for rays
+    /// and for light that comes in. Numbers below ten after a dozen of roundings.
+    #[test]
+    fn planes_of_depth_lie_across_a_camera_that_a_matrix_shears() {
+        let leaning = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, -1.0));
+        let projection = Projection::Orthographic { half_width: 1.0 };
+        let clip = [1.0, 4.0].map(|down| down * SQRT_2);
+        for lens in [None, Some(Lens { radius: 1.0, focus_distance: 3.0 })] {
+            let camera =
+                Camera::new(DAffine3::from_mat3(leaning), projection, [200, 100], lens, clip, DVec2::new(0.1, 0.2));
+            let pixels = [[0.0, 0.0], [200.0, 0.0], [130.0, 20.0], [200.0, 100.0]].map(DVec2::from);
+            let places = [[0.5, 0.5], [0.0, 0.0], [0.9, 0.1]].map(DVec2::from);
+            for (pixel, u) in pixels.into_iter().flat_map(|pixel| places.map(|u| (pixel, u))) {
+                let ray = camera.ray(pixel, || u);
+                let reach = camera.reach(&ray);
+                let [near, middle, far] = [0.0, 0.5 * reach, reach].map(|t| ray.at(t));
+                assert!((near.z + 1.0).abs() < 1e-13 && (far.z + 4.0).abs() < 1e-13, "{near} {far}");
+                assert!((camera.depth(middle) + middle.z * SQRT_2).abs() < 1e-13, "{middle}");
+                let enters = |part: f64| camera.entry(ray.at(part * reach), || u).is_some();
+                assert_eq!([0.01, 0.99, 1.01].map(enters), [true, true, false]);
+            }
         }
     }
 
