@@ -85,9 +85,9 @@
 //!                                   # both: diffuse_direct, … . emission, caustic, direct, indirect add up to the picture,
 //!                                   # and so do emission, caustic, diffuse, glossy, transmission, media
 //! - diffuse                         # or a name that says all: a way; light_groups: light_key, …, and light_default of
-//!                                   # lamps in no group and of depth fog; Z (depth along the line of sight, 1e10 where there is nothing),
-//!                                   # P, uv, motion (X to the right, Y up, in pixels, until the next frame): of the ray
-//!                                   # through the middle of the pixel, not filtered; normal, albedo (in daylight; of metal at
+//!                                   # lamps in no group and of depth fog; Z (depth along the line of sight, where there is nothing
+//!                                   # 1e10, or more beyond larger scenes), P, uv, motion (X to the right, Y up, in pixels,
+//!                                   # until the next frame): of the ray through the middle of the pixel, not filtered; normal, albedo (in daylight; of metal at
 //!                                   # normal incidence, of clear glass 1): means over it, of what is seen, not of holes;
 //!                                   # variance, stderr: of the pixel's mean, or of each of its bands; sampleCount;
 //!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte

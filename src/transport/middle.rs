@@ -16,7 +16,7 @@ use glam::{DAffine3, DVec2, DVec3};
 /// A datum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Middle {
-    /// Depth along the line of sight, metres; [`FAR`] where there is nothing.
+    /// Depth along the line of sight, metres; [`FAR`] where there is nothing, more in scenes that reach farther.
     Depth,
     /// The place, metres; 0 where there is nothing.
     Position,
@@ -27,8 +27,15 @@ pub enum Middle {
     Motion,
 }
 
-/// The depth of what is not there: beyond every scene, and finite, so that nothing that is computed with it is NaN.
+/// The least depth of what is not there.
 pub const FAR: f32 = 1e10;
+
+/// The depth of what is not there: beyond all that has an end, so that nothing of it is behind, and finite, so that nothing that is
+/// computed with it is NaN. In scenes that reach farther than [`FAR`] a power of ten, which few changes of a scene alter.
+fn far(scene: &Scene) -> f32 {
+    let reach = scene.radius + scene.camera.eye().distance(scene.center);
+    if reach < f64::from(FAR) { FAR } else { 10f64.powi(libm::log10(reach) as i32 + 1).min(f64::from(f32::MAX)) as f32 }
+}
 
 impl Middle {
     /// Names of its components; an empty one is the layer itself.
@@ -64,7 +71,7 @@ pub fn middle(
             });
             let values = match (middle, met) {
                 (Middle::Depth, Some(seen)) => [scene.camera.depth(seen.surface.point) as f32, 0.0, 0.0],
-                (Middle::Depth, None) => [FAR, 0.0, 0.0],
+                (Middle::Depth, None) => [far(scene), 0.0, 0.0],
                 (Middle::Position, Some(seen)) => seen.surface.point.to_array().map(|x| x as f32),
                 (Middle::Uv, Some(seen)) => [seen.surface.uv.x as f32, seen.surface.uv.y as f32, 0.0],
                 (Middle::Position | Middle::Uv, None) => [0.0; 3],
