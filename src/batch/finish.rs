@@ -147,7 +147,7 @@ pub struct Lens {
     pub aperture: Option<f64>,
     /// Distance in focus, metres, where the lens has a diameter.
     pub focus: Option<f64>,
-    /// How much of a frame the shutter is open, where it has one.
+    /// How much of a frame the shutter is open, where it has one that the picture knows of.
     pub shutter: Option<f64>,
 }
 
@@ -177,6 +177,7 @@ impl Finish {
         let target = stop.is_open().then_some(Target { error: stop.error, time, planned: *planned });
         let (white, note) = develop::white(&description.output.png, scene);
         let mattes = mattes::mattes(description, scene);
+        let shutter = description.camera.shutter.as_ref().filter(|_| plan.integrator.draws_times());
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
@@ -218,7 +219,7 @@ impl Finish {
             variance: asked(&LayerContent::Variance),
             sample_count: asked(&LayerContent::SampleCount),
             mattes,
-            lens: Lens::of(&scene.camera, description.camera.shutter.as_ref()),
+            lens: Lens::of(&scene.camera, shutter),
         }
     }
 

@@ -1,9 +1,9 @@
 //! Motion blur: the scene at moments while the shutter of the camera is open.
 //!
-//! Every sample sees one moment, drawn by a number of its own ([`crate::transport::moment`]), so that the picture is the mean
-//! over the moments, whatever changes: the estimate is unbiased for those moments, which stand at the middles of
-//! equal times. What the eye would see of their distance is bounded by their number: as many as the pixels that the
-//! fastest thing travels, 16 to 64.
+//! Every sample, and every path from a light, sees one moment, drawn by a number of its own ([`crate::transport::moment`]),
+//! so that the picture is the mean over the moments, whatever changes: the estimate is unbiased for those moments, which
+//! stand at the middles of equal times. What the eye would see of their distance is bounded by their number: as many as the
+//! pixels that the fastest thing travels, 16 to 64.
 
 use super::prepare::hash_text;
 use crate::description::{SceneDescription, ShutterTimes};
@@ -66,10 +66,8 @@ pub fn moments(
 ) -> Result<Moments> {
     let Some(shutter) = &description.camera.shutter else { return Ok(Moments::default()) };
     let Some(motion) = &description.motion else { return Ok(Moments::none("nothing changes over frames")) };
-    match integrator {
-        Integrator::Path(_) | Integrator::Depth | Integrator::Nothing => {}
-        Integrator::Whitted(_) => return Ok(Moments::none("whitted draws no times")),
-        Integrator::Light(_) => return Ok(Moments::none("light_tracer draws no times")),
+    if !integrator.draws_times() {
+        return Ok(Moments::none("whitted draws no times"));
     }
     let ShutterTimes { open, close, moments: wanted } = shutter.times();
     let (count, why) = match wanted {

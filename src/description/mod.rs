@@ -373,8 +373,8 @@
 //!
 //! With a `shutter` of the camera all that changes while it is open is blurred, cameras, shapes, lights and materials alike:
 //! each sample sees the scene at one of a number of evenly spaced moments. `image`, `integrator`, `layers`, `render` and
-//! `output` stay as at the frame. Where photons are merged all pixels of a sample see the same moment. `whitted` and
-//! `light_tracer` draw no times and show the frame itself, which `abbe plan` says.
+//! `output` stay as at the frame. Where photons are merged all pixels of a sample see the same moment. `whitted` draws no
+//! times and shows the frame itself, which `abbe plan` says.
 //!
 //! Which frames are rendered says `render.frames`, of the scene or of the batch, or `--frames`; a scene that changes and says
 //! nothing of frames is refused. Frame 12 is the very picture of a scene in which the values at 12 are written, with the

@@ -37,6 +37,15 @@ impl Integrator {
         self.no_light().is_none()
     }
 
+    /// Whether each of its samples and paths sees a moment of its own while the shutter is open.
+    #[must_use]
+    pub fn draws_times(&self) -> bool {
+        match self {
+            Integrator::Whitted(_) => false,
+            Integrator::Path(_) | Integrator::Light(_) | Integrator::Depth | Integrator::Nothing => true,
+        }
+    }
+
     /// Why it gives none; `None` where it does.
     fn no_light(&self) -> Option<&'static str> {
         match self {
