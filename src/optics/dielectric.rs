@@ -197,6 +197,12 @@ impl Dielectric {
         (chance < 1.0).then(|| self.reflection_of(wo, film.as_ref()))
     }
 
+    /// Whether wavelengths part here of which some are reflected without chance.
+    #[must_use]
+    pub fn reflects_all_of_some(&self, wo: DVec3) -> bool {
+        self.parts() && self.eta.each().into_iter().any(|eta| self.reflected(wo, eta) >= 1.0)
+    }
+
     /// The direction in which light is mirrored, and what is mirrored there of each lane as its weight.
     #[must_use]
     pub fn reflection(&self, wo: DVec3) -> BsdfSample {

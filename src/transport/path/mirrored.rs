@@ -81,10 +81,16 @@ impl Tracer<'_> {
             _ if !self.leads_to_a_lamp(&ray) => return None,
             _ => 0,
         };
+        // Any wavelength might lead along this way. Were the lamp counted here where one leads that is reflected by chance, and met where
+        // one leads that always is, the two would not add up to all of it: it is left to chance, whichever leads.
+        if bsdf.glass().is_some_and(|glass| glass.reflects_all_of_some(wo)) {
+            return None;
+        }
         self.add_mirrored::<CHROMATIC, MEDIA>(path, &ray, bsdf.mirrored(wo)?, most, at)
     }
 
-    /// Whether `ray`, within a shape of `glass`, may lead to a lamp from where it comes out of it, were there nothing else.
+    /// Whether `ray`, within a shape of `glass`, may lead to a lamp from where it comes out of it, were there nothing else; at any
+    /// wavelength.
     #[inline(never)]
     fn leads_out_to_a_lamp(&self, ray: &Ray, glass: &Dielectric, at: &Leaving) -> bool {
         let Geometry::Shape(shape) = &at.object.geometry else { return false };
@@ -94,10 +100,14 @@ impl Tracer<'_> {
         let Some(hit) = shape.intersect(ray, f64::INFINITY, Some(at.hit.part as u8)) else { return false };
         let point = ray.at(hit.t);
         let (wo, n) = (-ray.direction, shape.surface_with(point, hit.face, Detail::Geometry).normal);
-        let (cos, eta) = (wo.dot(n).abs(), glass.eta.hero());
-        let cos2 = 1.0 - (1.0 - cos * cos) * (eta * eta);
-        let went = refract(wo, n * wo.dot(n).signum(), eta.recip(), cos2.max(0.0).sqrt());
-        cos2 > 0.0 && self.leads_to_a_lamp(&Ray::new(point, went))
+        let cos = wo.dot(n).abs();
+        let leads = |eta: f64| {
+            let cos2 = 1.0 - (1.0 - cos * cos) * (eta * eta);
+            let went = refract(wo, n * wo.dot(n).signum(), eta.recip(), cos2.max(0.0).sqrt());
+            cos2 > 0.0 && self.leads_to_a_lamp(&Ray::new(point, went))
+        };
+        // A lamp within the shape is before it whichever wavelength leads: it is looked for by all or none.
+        if glass.parts() { glass.eta.each().into_iter().any(leads) } else { leads(glass.eta.hero()) }
     }
 
     /// Whether `ray` may meet a lamp, or goes into a sun.
@@ -206,12 +216,13 @@ impl Tracer<'_> {
             let Bsdf::Dielectric(glass) = material.bsdf_beside(&at, self.nm, self.plan.all_dispersive, around) else {
                 return None;
             };
-            // Here, too, wavelengths that go on side by side come to another place each.
-            if self.parts_at::<CHROMATIC>(path, &glass) {
+            let frame = Frame::from_normal_and_tangent(seen_normal(&surface, -went), surface.tangent);
+            let wo = frame.to_local(-went);
+            // Here, too, wavelengths that go on side by side come to another place each, and of those that turn back any might lead.
+            if self.parts_at::<CHROMATIC>(path, &glass) || glass.reflects_all_of_some(wo) {
                 return None;
             }
-            let frame = Frame::from_normal_and_tangent(seen_normal(&surface, -went), surface.tangent);
-            let (sample, chance) = glass.go_through(frame.to_local(-went))?;
+            let (sample, chance) = glass.go_through(wo)?;
             let wi = frame.to_world(sample.wi);
             if wi.dot(surface.normal) * sample.wi.z <= 0.0 {
                 return None;
