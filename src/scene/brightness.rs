@@ -163,8 +163,8 @@ impl Cone {
 
 #[cfg(test)]
 mod tests {
-    use super::Powers;
-    use crate::film::accumulate::SAMPLE_LIMIT;
+    use super::{Powers, counted_over};
+    use crate::film::accumulate::{QUANTUM, SAMPLE_LIMIT};
     use crate::scene::compile::testing::compiled;
 
     fn powers(text: &str) -> Powers {
@@ -233,6 +233,26 @@ mod tests {
             let most = (sky * 2f64.powi(18 - exponent)).min(limit.next_down());
             assert!((most / 2f64.powi(squared)).powi(2) < limit, "2^{n}: {exponent}, {squared}");
             assert!(n < 0 || exponent + squared == n, "2^{n}: {exponent}, {squared}");
+        }
+    }
+
+    /// Of 2⁻⁶⁴ between 2⁻²⁴ and 2²⁰; else of 2⁻⁶⁴ or 2⁻⁸⁴ of the brightest or less, down to half of that.
+    #[test]
+    fn light_is_counted_in_the_steps_that_the_limits_tell() {
+        for (brightest, most) in [
+            (1e-30, 5e-50),
+            (1e-20, 5e-40),
+            (5.9e-8, 5e-20 * 5.9e-8),
+            (6e-8, 5e-20),
+            (1.0, 5e-20),
+            (1e6, 5e-20),
+            (2e6, 5e-26 * 2e6),
+            (1e20, 5e-6),
+            (1e36, 5e10),
+        ] {
+            let step = QUANTUM * 2f64.powi(counted_over(brightest).exponent);
+            let share = step / most;
+            assert!((0.5..=1.1).contains(&share), "{brightest:e}: {step:e}, {share} of {most:e}");
         }
     }
 
