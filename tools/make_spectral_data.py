@@ -85,7 +85,7 @@ METALS = [
     ("palladium", "Pd", "main/Pd/nk/Johnson.yml"),
     ("manganese", "Mn", "main/Mn/nk/Johnson.yml"),
     ("tungsten", "W", "main/W/nk/Weaver.yml"),
-    ("platinum", "Pt", "main/Pt/nk/Werner.yml"),
+    ("platinum", "Pt", "main/Pt/nk/Rakic-BB.yml"),
     ("molybdenum", "Mo", "main/Mo/nk/Kirillova.yml"),
     ("mercury", "Hg", "main/Hg/nk/Inagaki.yml"),
     ("rhodium", "Rh", "main/Rh/nk/Weaver.yml"),
