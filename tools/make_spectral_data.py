@@ -97,7 +97,8 @@ METALS = [
     ("magnesium", "Mg", "main/Mg/nk/Palm.yml"),
     ("brass", "Cu70Zn30", "other/alloys/Cu-Zn/nk/Querry-Cu70Zn30.yml"),
     ("stainless-steel", "steel", "other/alloys/stainless steel/nk/Karlsson-austenitic.yml"),
-    ("titanium-nitride", "TiN", "main/TiN/nk/Shkondin.yml"),
+    ("titanium-nitride", "TiN titanium-nitride-pfluger", "main/TiN/nk/Pfluger.yml"),
+    ("titanium-nitride-shkondin", "", "main/TiN/nk/Shkondin.yml"),
     ("silicon", "Si", "main/Si/nk/Green-2008.yml"),
     # Further measurements: those of which Mitsuba's tables of the same substance are nearest in reflectance.
     ("silver-rakic", "", "main/Ag/nk/Rakic-LD.yml"),
@@ -116,7 +117,6 @@ METALS = [
     ("caesium-iodide", "CsI", "main/CsI/nk/Querry.yml"),
     ("magnesium-oxide", "MgO", "main/MgO/nk/Synowicki.yml"),
     ("titanium-carbide", "TiC", "main/TiC/nk/Pfluger.yml"),
-    ("titanium-nitride-pfluger", "", "main/TiN/nk/Pfluger.yml"),
     ("vanadium-carbide", "VC", "main/VC/nk/Pfluger.yml"),
     ("vanadium-nitride", "VN", "main/VN/nk/Pfluger.yml"),
 ]

@@ -334,6 +334,11 @@ mod tests {
         for (nm, r) in [(450.0, 0.588), (550.0, 0.642), (650.0, 0.679)] {
             assert!((reflectance("Pt", nm) - r).abs() < 0.04, "platinum at {nm} nm: {}", reflectance("Pt", nm));
         }
+        // Titanium nitride is golden, as Mitsuba's table by the name TiN is; a film of atomic layers is not.
+        for name in ["titanium-nitride", "TiN"] {
+            assert!(reflectance(name, 650.0) > 2.0 * reflectance(name, 450.0), "{name}: {}", reflectance(name, 450.0));
+        }
+        assert!(reflectance("titanium-nitride-shkondin", 650.0) < reflectance("titanium-nitride-shkondin", 450.0));
         for m in METALS.iter() {
             assert!(
                 m.k.at(600.0) >= 0.0 && m.eta.at(600.0) > 0.0 && !m.eta.is_constant() && !m.reference.is_empty(),
