@@ -49,7 +49,7 @@ pub enum RefractiveIndex {
         /// As the database lists them.
         coefficients: Vec<f64>,
     },
-    /// Linear between samples in ascending order of wavelength; held beyond the ends.
+    /// Linear between samples in ascending order of wavelength, in the band and to its neighbours; held beyond the ends.
     Table {
         /// (nm, n).
         samples: Vec<[f64; 2]>,
@@ -205,26 +205,7 @@ impl RefractiveIndex {
     /// somewhere in it, or a table that does not cover it or is not in order.
     pub fn check_band(&self) -> Result<(), String> {
         if let RefractiveIndex::Table { samples } = self {
-            if let Some(i) = (1..samples.len()).find(|i| samples[*i][0] <= samples[i - 1][0]) {
-                return Err(format!(
-                    "sample {i}: expected ascending wavelengths, found {} nm after {} nm",
-                    in_short(samples[i][0]),
-                    in_short(samples[i - 1][0])
-                ));
-            }
-            let covers = samples.first().is_some_and(|s| s[0] <= BAND_NM[0])
-                && samples.last().is_some_and(|s| s[0] >= BAND_NM[1]);
-            if !covers {
-                let range = match (samples.first(), samples.last()) {
-                    (Some(a), Some(b)) => {
-                        let in_um = a[0] * 1e3 <= BAND_NM[1] && b[0] * 1e3 >= BAND_NM[0];
-                        let hint = if in_um { " (are they in µm?)" } else { "" };
-                        format!("{} to {} nm{hint}", in_short(a[0]), in_short(b[0]))
-                    }
-                    _ => "no samples".to_string(),
-                };
-                return Err(format!("expected a table of 360 to 830 nm, found {range}"));
-            }
+            check_table(samples, BAND_NM)?;
         }
         if let Some(nm) = self.pole() {
             return Err(format!(
@@ -259,6 +240,37 @@ impl RefractiveIndex {
         };
         squares.into_iter().map(|s| s.sqrt() * 1e3).find(|nm| (BAND_NM[0]..=BAND_NM[1]).contains(nm))
     }
+}
+
+/// Whether a table of (nm, value) covers `range` and is in ascending order where light meets it. In the ultraviolet and the
+/// infrared files have rows that stand twice or out of order: rows in the band count, and a neighbour on each side.
+///
+/// # Errors
+/// In words, if not.
+pub(crate) fn check_table(samples: &[[f64; 2]], range: [f64; 2]) -> Result<(), String> {
+    // What stands before the first of these is not above the band's lower end, what stands after the last not below its upper.
+    let first = samples.iter().position(|s| s[0] > BAND_NM[0]).unwrap_or(samples.len()).max(1);
+    let end = samples.iter().rposition(|s| s[0] < BAND_NM[1]).map_or(0, |i| i + 2).min(samples.len());
+    if let Some(i) = (first..end).find(|i| samples[*i][0] <= samples[i - 1][0]) {
+        return Err(format!(
+            "sample {i}: expected ascending wavelengths, found {} nm after {} nm",
+            in_short(samples[i][0]),
+            in_short(samples[i - 1][0])
+        ));
+    }
+    let covers = samples.first().is_some_and(|s| s[0] <= range[0]) && samples.last().is_some_and(|s| s[0] >= range[1]);
+    if !covers {
+        let found = match (samples.first(), samples.last()) {
+            (Some(a), Some(b)) => {
+                let in_um = a[0] * 1e3 <= BAND_NM[1] && b[0] * 1e3 >= BAND_NM[0];
+                let hint = if in_um { " (are they in µm?)" } else { "" };
+                format!("{} to {} nm{hint}", in_short(a[0]), in_short(b[0]))
+            }
+            _ => "no samples".to_string(),
+        };
+        return Err(format!("expected a table of {} to {} nm, found {found}", range[0], range[1]));
+    }
+    Ok(())
 }
 
 /// x to the power e; whole powers by multiplication, others by `libm`.
@@ -432,6 +444,22 @@ mod tests {
         }
     }
 
+    /// Rows that stand twice or out of order beyond the band's neighbours are no fault, and change nothing in the band.
+    #[test]
+    fn rows_that_no_light_meets_may_stand_in_any_order() {
+        let met = [[350.0, 1.7], [400.0, 1.6], [800.0, 1.5], [900.0, 1.4]];
+        let table = |rows: &[[f64; 2]]| RefractiveIndex::Table { samples: rows.to_vec() };
+        let before = [[77.55, 2.0], [77.55, 2.1], [60.0, 2.2], [350.0, 1.9]];
+        let after = [[5102.0, 1.3], [1320.0, 1.2], [1320.0, 1.1]];
+        let all = table(&[&before[..], &met[..], &after[..]].concat());
+        assert_eq!(all.check_band(), Ok(()));
+        for nm in [360.0, 400.0, 555.5, 800.0, 830.0] {
+            assert_eq!(all.at(nm), table(&met).at(nm), "{nm} nm");
+        }
+        // None may stand among those of the band.
+        assert!(table(&[[300.0, 1.6], [900.0, 1.5], [700.0, 1.5], [950.0, 1.4]]).check_band().is_err());
+    }
+
     #[test]
     fn an_index_that_fails_in_the_band_is_refused_in_words() {
         // A resonance at 0.5 µm.
@@ -444,8 +472,10 @@ mod tests {
         assert!(short.check_band().unwrap_err().ends_with("400 to 700 nm"));
         let micrometres = RefractiveIndex::Table { samples: vec![[0.4, 1.5], [0.7, 1.5]] };
         assert!(micrometres.check_band().unwrap_err().ends_with("found 0.4 to 0.7 nm (are they in µm?)"));
-        let disorder = RefractiveIndex::Table { samples: vec![[300.0, 1.5], [300.0, 1.5], [900.0, 1.5]] };
-        assert!(disorder.check_band().unwrap_err().contains("ascending"));
+        let disorder = RefractiveIndex::Table { samples: vec![[300.0, 1.5], [500.0, 1.5], [500.0, 1.5], [900.0, 1.5]] };
+        assert!(disorder.check_band().unwrap_err().contains("sample 2: expected ascending wavelengths, found 500 nm"));
+        let descending = RefractiveIndex::Table { samples: vec![[900.0, 1.5], [500.0, 1.5], [300.0, 1.5]] };
+        assert!(descending.check_band().unwrap_err().contains("ascending"));
         assert!(RefractiveIndex::Table { samples: vec![] }.check_band().unwrap_err().contains("no samples"));
         assert!(RefractiveIndex::Constant(f64::NAN).check_band().is_err());
         assert!(RefractiveIndex::Constant(15.0).check_band().unwrap_err().contains("found 15"));
