@@ -417,7 +417,7 @@
 //! An index has to hold over 360 to 830 nm: a table covers that, and a formula has no resonance there; and it is 0.1 to 10, also
 //! in the fields that want one without dispersion. A formula of the
 //! catalogue or a file is used beyond the range for which it is stated if that covers 405 to 700 nm (strontium titanate's
-//! begins at 430), with a note. Where a
+//! begins at 430), with a note; and so are the last values of a table of k that a file has beside its n. Where a
 //! file says how much its material absorbs (k), a closed body of `dielectric` whose `inside` is not written does so, by
 //! σ = 4πk/λ. An index below 1 belongs to a metal, which has k: `dielectric` refuses such files, and notes such numbers,
 //! which are right as a ratio to another index only.
@@ -544,7 +544,7 @@ pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, P
 pub(crate) use medium::{UNCHANGED, VACUUM};
 pub use mitsuba::export::{Exported, Loss, MeshNormals, Meshes, PictureAnew, PictureRead, export};
 pub(crate) use node::did_you_mean;
-pub use optical_data::{OpticalData, optical_data};
+pub use optical_data::{OpticalData, ReadK, optical_data};
 pub use output::{
     Channels, Colour, Compression, Exposure, Exr, Output, Png, PngDither, PngSpace, Precision, Tonemap, WhiteBalance,
 };

@@ -4,7 +4,8 @@
 //! file has lines of numbers under headings `wl,n`, `wl,k` or `wl,n,k`.
 //!
 //! A formula is taken beyond the range that the file states if that covers 405 to 700 nm, outside of which lies less
-//! than 1 % of each of x̄, ȳ and z̄, and says so; else the file is refused. A table is never continued.
+//! than 1 % of each of x̄, ȳ and z̄, and says so; else the file is refused. So is a k beside an n, whose last values are held:
+//! makers measure the k of dense glass from 365 to 400 nm on. No other table is continued.
 
 use std::path::Path;
 
@@ -12,9 +13,10 @@ use super::fault::Fault;
 use super::node::{Node, Place, Sources, Value};
 use super::yaml;
 use crate::error::{Error, Result, in_short};
+use crate::spectrum::index::check_table;
 use crate::spectrum::{BAND_NM, RefractiveIndex};
 
-/// What the stated range of a formula has to cover, nm.
+/// What the stated range of a formula, and a table of k beside an n, has to cover, nm.
 const MUST_COVER: [f64; 2] = [405.0, 700.0];
 
 /// How far below zero k may be, which is then taken as zero: by as much as clear glass absorbs, σ = 0.25 m⁻¹.
@@ -28,10 +30,19 @@ const MOST_K: f64 = 1e6;
 pub struct OpticalData {
     /// The index n.
     pub index: Option<RefractiveIndex>,
-    /// The imaginary part k: pairs of nm and k, which cover the band.
+    /// The imaginary part k: pairs of nm and k; beyond the ends the last values are held.
     pub k: Option<Vec<[f64; 2]>>,
-    /// Where the formula is used beyond the range that the file states.
-    pub note: Option<String>,
+    /// Where the formula, or a k that is needed, is used beyond the range that the file states.
+    pub notes: Vec<String>,
+}
+
+/// Whether the k of a file is needed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum ReadK {
+    /// By metals, and by bodies that absorb by it: one that cannot be used is a fault.
+    Needed,
+    /// By nothing that uses the index alone: one that cannot be used is passed over.
+    PassedOver,
 }
 
 impl OpticalData {
@@ -43,12 +54,12 @@ impl OpticalData {
     }
 }
 
-/// Reads a file; one whose name ends in `.yml` or `.yaml` is YAML, any other CSV.
+/// Reads a file, with its k as far as `k` says; one whose name ends in `.yml` or `.yaml` is YAML, any other CSV.
 ///
 /// # Errors
 /// [`Error::Input`] if it cannot be read, or with line, column and field where it is not what it should be or cannot be used
 /// over the whole band.
-pub fn optical_data(path: &Path) -> Result<OpticalData> {
+pub fn optical_data(path: &Path, k: ReadK) -> Result<OpticalData> {
     let mut bytes = crate::input::read(path).map_err(|e| {
         let message = match e.kind() {
             std::io::ErrorKind::NotFound => "expected a file, found none".to_owned(),
@@ -61,9 +72,9 @@ pub fn optical_data(path: &Path) -> Result<OpticalData> {
     let source = Sources::default().add_file(path);
     let ending = path.extension().map(|e| e.to_ascii_lowercase());
     let read = if ending.is_some_and(|e| e == "yml" || e == "yaml") {
-        yaml::read(&bytes, source).and_then(|root| of_yaml(&root))
+        yaml::read(&bytes, source).and_then(|root| of_yaml(&root, k))
     } else {
-        of_csv(&String::from_utf8_lossy(crate::input::without_mark(&bytes)), source)
+        of_csv(&String::from_utf8_lossy(crate::input::without_mark(&bytes)), source, k)
     };
     read.map_err(|fault| {
         let Place { line, column, .. } = fault.place.unwrap_or_default();
@@ -79,11 +90,14 @@ enum Columns {
     Nk,
 }
 
-/// Tables of n and k in the making: (nm, value), and where they stand.
+/// Where a table stands, its field, and its rows (nm, value).
+type Rows = (Place, String, Vec<[f64; 2]>);
+
+/// Tables of n and k in the making.
 #[derive(Default)]
 struct Tables {
-    n: Option<(Place, String, Vec<[f64; 2]>)>,
-    k: Option<(Place, String, Vec<[f64; 2]>)>,
+    n: Option<Rows>,
+    k: Option<Rows>,
 }
 
 impl Tables {
@@ -111,34 +125,47 @@ impl Tables {
         Ok(())
     }
 
-    /// The data of both, once they cover the band.
-    fn finish(self, data: &mut OpticalData) -> std::result::Result<(), Fault> {
+    /// The data of both, once they cover what they have to.
+    fn finish(self, data: &mut OpticalData, k: ReadK) -> std::result::Result<(), Fault> {
         if let Some((place, field, samples)) = self.n {
             let index = RefractiveIndex::Table { samples };
             index.check_band().map_err(|fault| told(place, &field, &fault))?;
             data.index = Some(index);
         }
-        if let Some((place, field, samples)) = self.k {
-            if let Some([nm, k]) = samples.iter().find(|s| s[1] < -MOST_NOISE) {
-                return Err(told(
-                    place,
-                    &field,
-                    &format!("expected k of 0 or more, found {} at {nm} nm", in_short(*k)),
-                ));
+        let Some(table) = self.k else { return Ok(()) };
+        let range = if data.index.is_some() { MUST_COVER } else { BAND_NM };
+        data.k = match (usable_k(table, range), k) {
+            (Ok(samples), ReadK::Needed) => {
+                let stated = [samples[0][0], samples[samples.len() - 1][0]];
+                data.notes.extend(beyond(stated, "k is stated for", "held over"));
+                Some(samples)
             }
-            if let Some([nm, k]) = samples.iter().find(|s| s[1] > MOST_K) {
-                let found = format!("expected k of at most {MOST_K}, found {} at {nm} nm", in_short(*k));
-                return Err(told(place, &field, &found));
-            }
-            // The same rules as for an index, but for its size.
-            let lifted = samples.iter().map(|s| [s[0], 1.0]).collect();
-            let covered = RefractiveIndex::Table { samples: lifted }.check_band();
-            covered.map_err(|fault| told(place, &field, &format!("k: {fault}")))?;
-            // Of clear glass k is a small difference, and noise takes some below zero.
-            data.k = Some(samples.into_iter().map(|[nm, k]| [nm, k.max(0.0)]).collect());
-        }
+            (Err(fault), ReadK::Needed) => return Err(fault),
+            (found, ReadK::PassedOver) => found.ok(),
+        };
         Ok(())
     }
+}
+
+/// The rows of a k that covers `range`.
+fn usable_k((place, field, samples): Rows, range: [f64; 2]) -> std::result::Result<Vec<[f64; 2]>, Fault> {
+    if let Some([nm, k]) = samples.iter().find(|s| s[1] < -MOST_NOISE) {
+        let found = format!("expected k of 0 or more, found {} at {nm} nm", in_short(*k));
+        return Err(told(place, &field, &found));
+    }
+    if let Some([nm, k]) = samples.iter().find(|s| s[1] > MOST_K) {
+        let found = format!("expected k of at most {MOST_K}, found {} at {nm} nm", in_short(*k));
+        return Err(told(place, &field, &found));
+    }
+    check_table(&samples, range).map_err(|fault| told(place, &field, &format!("k: {fault}")))?;
+    // Of clear glass k is a small difference, and noise takes some below zero.
+    Ok(samples.into_iter().map(|[nm, k]| [nm, k.max(0.0)]).collect())
+}
+
+/// Says that `what` is stated for less than the band, and `done` over it, if so.
+fn beyond([low, high]: [f64; 2], what: &str, done: &str) -> Option<String> {
+    let is_beyond = low > BAND_NM[0] || high < BAND_NM[1];
+    is_beyond.then(|| format!("{what} {low:.0} to {high:.0} nm and {done} 360 to 830 nm"))
 }
 
 fn told(place: Place, field: &str, message: &str) -> Fault {
@@ -170,7 +197,7 @@ fn numbers(node: &Node, field: &str) -> std::result::Result<Vec<f64>, Fault> {
 /// What the types of formulas begin with.
 const FORMULA: &str = "formula ";
 
-fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
+fn of_yaml(root: &Node, k: ReadK) -> std::result::Result<OpticalData, Fault> {
     let expected = "DATA: expected a list of formulas and tables";
     let Some(list) = root.get("DATA") else { return Err(told(root.place, "", &format!("{expected}, found no DATA"))) };
     let Value::List(entries) = &list.value else {
@@ -195,7 +222,8 @@ fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
             // Older editions of the database call it `range`.
             let range = field("wavelength_range").or_else(|missing| entry.get("range").ok_or(missing))?;
             let (index, note) = formula(number, kind_node, field("coefficients")?, range, &at)?;
-            (data.index, data.note) = (Some(index), note);
+            data.index = Some(index);
+            data.notes.extend(note);
             continue;
         }
         let columns = match kind.as_str() {
@@ -219,7 +247,7 @@ fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
         };
         tables.add(columns, rows_node.place, &at("data"), &rows)?;
     }
-    tables.finish(&mut data)?;
+    tables.finish(&mut data, k)?;
     if data.index.is_none() && data.k.is_none() {
         return Err(told(list.place, "DATA", "expected a formula or a table, found none"));
     }
@@ -263,13 +291,11 @@ fn formula(
         return Err(told(range.place, &at("wavelength_range"), &message));
     }
     index.check_band().map_err(fault)?;
-    let beyond = low > BAND_NM[0] || high < BAND_NM[1];
-    let note = || format!("the formula is stated for {low:.0} to {high:.0} nm and continued to 360 to 830 nm");
-    Ok((index, beyond.then(note)))
+    Ok((index, beyond([low, high], "the formula is stated for", "continued to")))
 }
 
 /// Headings `wl,n`, and rows under them.
-fn of_csv(text: &str, source: u32) -> std::result::Result<OpticalData, Fault> {
+fn of_csv(text: &str, source: u32, k: ReadK) -> std::result::Result<OpticalData, Fault> {
     let mut tables = Tables::default();
     // The table that is being read: its columns, its heading's line, its rows.
     let mut open: Option<(Columns, u32, Vec<Vec<f64>>)> = None;
@@ -312,7 +338,7 @@ fn of_csv(text: &str, source: u32) -> std::result::Result<OpticalData, Fault> {
     }
     close(open.take())?;
     let mut data = OpticalData::default();
-    tables.finish(&mut data)?;
+    tables.finish(&mut data, k)?;
     if data.index.is_none() && data.k.is_none() {
         return Err(told(place(1), "", "expected a heading wl,n or wl,k or wl,n,k, found none"));
     }
@@ -325,10 +351,14 @@ mod tests {
 
     /// The data of a file called `name`, or the fault without its directory.
     fn read(name: &str, text: &str) -> std::result::Result<OpticalData, String> {
+        read_with(name, text, ReadK::Needed)
+    }
+
+    fn read_with(name: &str, text: &str, k: ReadK) -> std::result::Result<OpticalData, String> {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join(name);
         std::fs::write(&path, text).unwrap();
-        optical_data(&path).map_err(|e| {
+        optical_data(&path, k).map_err(|e| {
             assert_eq!(e.exit_code(), 3, "{e}");
             e.to_string().replace(&format!("{}/", directory.path().display()), "")
         })
@@ -345,7 +375,7 @@ mod tests {
     fn a_formula_with_a_table_of_k_is_read() {
         let data = read("N-BK7.yml", BK7).unwrap();
         assert!((data.index.as_ref().unwrap().at(587.5618) - 1.5168).abs() < 1e-5);
-        assert!((data.k_at(546.0) - 6.9658e-9).abs() < 1e-15 && data.note.is_none());
+        assert!((data.k_at(546.0) - 6.9658e-9).abs() < 1e-15 && data.notes.is_empty());
     }
 
     #[test]
@@ -389,8 +419,8 @@ mod tests {
     fn a_formula_beyond_its_range_is_noted_or_refused() {
         let with = |range: &str| read("a.yml", &BK7.replace("0.3 2.5", range));
         assert_eq!(
-            with("0.404 0.7065").unwrap().note.unwrap(),
-            "the formula is stated for 404 to 706 nm and continued to 360 to 830 nm"
+            with("0.404 0.7065").unwrap().notes,
+            ["the formula is stated for 404 to 706 nm and continued to 360 to 830 nm"]
         );
         for (range, found) in [("0.5 2.5", "500 to 2500"), ("0.3 0.6", "300 to 600")] {
             assert_eq!(
@@ -401,6 +431,45 @@ mod tests {
                 )
             );
         }
+    }
+
+    /// Of dense glasses makers state k from 365 to 400 nm on: what it is there it is to the end of the band, with a note beside that
+    /// of the formula.
+    #[test]
+    fn a_k_beside_an_index_is_held_beyond_its_ends() {
+        let from = |nm: &str| BK7.replace("0.300 2", nm);
+        let dense = read("a.yml", &from("0.370 2").replace("0.3 2.5", "0.365 2.5")).unwrap();
+        assert_eq!([360.0, 365.0, 370.0].map(|nm| dense.k_at(nm)), [2.8607e-6; 3]);
+        let formula = "the formula is stated for 365 to 2500 nm and continued to 360 to 830 nm";
+        assert_eq!(dense.notes, [formula, "k is stated for 370 to 2500 nm and held over 360 to 830 nm"]);
+        let csv = read("a.csv", "wl,n\n0.3,1.5\n0.9,1.4\nwl,k\n0.3,1e-8\n0.75,2e-8\n").unwrap();
+        assert_eq!(csv.k_at(830.0), 2e-8);
+        assert_eq!(csv.notes, ["k is stated for 300 to 750 nm and held over 360 to 830 nm"]);
+        // By itself a k covers the band.
+        let alone = "DATA:\n- type: tabulated k\n  data: |\n    0.37 1e-8\n    0.9 1e-9\n";
+        assert!(
+            read("a.yml", alone).unwrap_err().contains("k: expected a table of 360 to 830 nm, found 370 to 900 nm")
+        );
+        assert!(
+            read("a.yml", &from("0.410 2"))
+                .unwrap_err()
+                .contains("expected a table of 405 to 700 nm, found 410 to 2500")
+        );
+    }
+
+    /// What uses the index alone does without a k that cannot be used, and has no word of one that is held.
+    #[test]
+    fn a_k_that_is_not_needed_is_passed_over() {
+        let passed_over = |text: &str| read_with("a.yml", text, ReadK::PassedOver).unwrap();
+        for text in
+            [BK7.replace("0.300 2", "0.410 2"), BK7.replace("8.1300E-06", "-8e-6"), BK7.replace("2.500", "0.546")]
+        {
+            assert!(read("a.yml", &text).is_err(), "{text}");
+            let data = passed_over(&text);
+            assert_eq!((data.index, data.k), (read("b.yml", BK7).unwrap().index, None));
+        }
+        let held = passed_over(&BK7.replace("0.300 2", "0.370 2"));
+        assert!(held.k.is_some() && held.notes.is_empty());
     }
 
     #[test]
@@ -424,7 +493,8 @@ mod tests {
             bad("0.546 6", "0.546 x").contains("DATA[1].data: row 2: expected 2 numbers, found \"0.546 x.9658E-09\"")
         );
         assert!(
-            bad("2.500 8", "0.700 8").contains("DATA[1].data: k: expected a table of 360 to 830 nm, found 300 to 700")
+            bad("2.500 8", "0.690 8")
+                .contains("DATA[1].data: k: expected a table of 405 to 700 nm, found 300 to 690 nm")
         );
         assert!(bad("8.1300E-06", "-8e-6").contains("expected k of 0 or more, found -8e-6 at 2500 nm"));
         assert!(bad("8.1300E-06", "1e308").contains("expected k of at most 1000000, found 1e308 at 2500 nm"));
@@ -451,7 +521,10 @@ mod tests {
             "a.csv: line 1, column 1: expected rows of numbers, found none"
         );
         assert!(
-            optical_data(Path::new("/nowhere/a.yml")).unwrap_err().to_string().contains("expected a file, found none")
+            optical_data(Path::new("/nowhere/a.yml"), ReadK::Needed)
+                .unwrap_err()
+                .to_string()
+                .contains("expected a file, found none")
         );
     }
 }

@@ -114,6 +114,30 @@ fn files_that_cannot_be_used_are_told_with_both_places() {
     );
 }
 
+/// A glass whose k begins at `from` µm, as that of dense flints does: its first value is held where it is needed, and of no account
+/// beside another absorption.
+#[test]
+fn a_k_that_ends_within_the_band_is_held_with_a_note_or_passed_over() {
+    let notes = |absorption: &str, from: f64| {
+        let file = format!(
+            "DATA:\n- type: formula 5\n  wavelength_range: 0.3 2.4\n  coefficients: 1.5\n- type: tabulated k\n  data: |\n    \
+             {from} 1e-8\n    2.4 1e-8\n"
+        );
+        let text = format!(
+            "{CAMERA}shapes:\n- sphere: {{radius: 1, material: {{dielectric: {{ior: {{file: f.yml}}{absorption}}}}}}}\n"
+        );
+        try_bench(&text, &[("f.yml", file.as_bytes())]).map(|scene| scene.prepared.scene.notes.join("\n"))
+    };
+    assert!(notes("", 0.37).unwrap().contains("k is stated for 370 to 2400 nm and held over 360 to 830 nm"));
+    let fault = notes("", 0.45).unwrap_err();
+    assert!(fault.contains("DATA[1].data: k: expected a table of 405 to 700 nm, found 450 to 2400 nm"), "{fault}");
+    for absorption in [", absorption: none", ", absorption: {color: 0.5, at: 1}"] {
+        for from in [0.37, 0.45] {
+            assert!(!notes(absorption, from).unwrap().contains("k is stated"), "{absorption} {from}");
+        }
+    }
+}
+
 const SHOWN: &str = "shapes: [{sphere: {radius: 1, material: {mask: {material: m}}}}]\n";
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::Compiler;
 use super::spectra::Role;
-use crate::description::{self as written, OpticalData};
+use crate::description::{self as written, OpticalData, ReadK};
 use crate::error::in_short;
 use crate::optics::phase::Phase;
 use crate::scene::Geometry;
@@ -41,7 +41,7 @@ impl<'a> Compiler<'a> {
             written::Index::Schott(a) => Ok(RefractiveIndex::Schott { a: *a }),
             written::Index::Formula(f) => RefractiveIndex::formula(f.number, &f.coefficients),
             written::Index::File(path) => {
-                return match self.optical_data(&format!("{at}.file"), path) {
+                return match self.optical_data(&format!("{at}.file"), path, ReadK::PassedOver) {
                     Some(data) => {
                         let index = self.clear_index(&format!("{at}.file"), data);
                         self.shelf.carried.index(index)
@@ -62,13 +62,11 @@ impl<'a> Compiler<'a> {
     }
 
     /// What a file says.
-    fn optical_data(&mut self, at: &str, path: &written::FilePath) -> Option<OpticalData> {
+    fn optical_data(&mut self, at: &str, path: &written::FilePath, k: ReadK) -> Option<OpticalData> {
         self.files.push(path.to_path_buf());
-        match written::optical_data(path) {
+        match written::optical_data(path, k) {
             Ok(data) => {
-                if let Some(note) = &data.note {
-                    self.note(at, note);
-                }
+                data.notes.iter().for_each(|note| self.note(at, note));
                 Some(data)
             }
             Err(error) => {
@@ -103,7 +101,7 @@ impl<'a> Compiler<'a> {
     /// n and k of a metal's file.
     pub(super) fn metal_file(&mut self, at: &str, path: &written::FilePath) -> (Spectrum, Spectrum) {
         let stand_in = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
-        let Some(data) = self.optical_data(at, path) else { return stand_in };
+        let Some(data) = self.optical_data(at, path, ReadK::Needed) else { return stand_in };
         let (Some(index), Some(_)) = (&data.index, &data.k) else {
             self.fault(at, "expected both n and k, found one of them");
             return stand_in;
@@ -118,7 +116,7 @@ impl<'a> Compiler<'a> {
     /// The absorption of a clear body, m⁻¹: as it is written, else by the k of the file of its index.
     pub(super) fn absorption(&mut self, at: &str, m: &'a written::Dielectric) -> Option<Spectrum> {
         let by_k = |c: &mut Self, at: &str, path: &written::FilePath, asked: bool| {
-            let data = c.optical_data(at, path)?;
+            let data = c.optical_data(at, path, ReadK::Needed)?;
             if data.k.is_none() {
                 if asked {
                     c.fault(at, "expected a table of k, found none");

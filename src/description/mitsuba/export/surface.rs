@@ -6,7 +6,7 @@ use super::super::super::material::{
     Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic,
     ThinDielectric,
 };
-use super::super::super::optical_data::optical_data;
+use super::super::super::optical_data::{ReadK, optical_data};
 use super::super::super::spectrum::{Index, Spectrum, SpectrumOrTexture};
 use super::spectra::Role;
 use super::{Export, joined};
@@ -204,7 +204,7 @@ impl Export<'_> {
                 }
             }
             ConductorIndex::File(file) => {
-                if let Ok(data) = optical_data(file) {
+                if let Ok(data) = optical_data(file, ReadK::Needed) {
                     let curve = |f: &dyn Fn(f64) -> f64| {
                         let all = (0..=94).map(|i| 360.0 + 5.0 * f64::from(i)).map(|nm| (nm, f(nm)));
                         spectrum::Spectrum::from_samples(&all.collect::<Vec<_>>(), Outside::Hold)
@@ -338,7 +338,7 @@ fn alike(inside: &Index, outside: &Index) -> bool {
 pub(super) fn absorbs(m: &Dielectric) -> bool {
     match (&m.absorption, &m.ior) {
         (Some(absorption), _) => *absorption != Absorption::None,
-        (None, Index::File(file)) => optical_data(file).is_ok_and(|data| data.k.is_some()),
+        (None, Index::File(file)) => optical_data(file, ReadK::Needed).is_ok_and(|data| data.k.is_some()),
         (None, _) => false,
     }
 }
@@ -354,7 +354,7 @@ fn at_d(index: &Index) -> f64 {
         Index::Table(samples) => Some(RefractiveIndex::Table { samples: samples.clone() }),
         Index::Schott(a) => Some(RefractiveIndex::Schott { a: *a }),
         Index::Formula(f) => RefractiveIndex::formula(f.number, &f.coefficients).ok(),
-        Index::File(file) => optical_data(file).ok().and_then(|data| data.index),
+        Index::File(file) => optical_data(file, ReadK::PassedOver).ok().and_then(|data| data.index),
     };
     curve.map_or(1.5, |curve| curve.at(D_LINE_NM))
 }
