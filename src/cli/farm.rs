@@ -41,8 +41,10 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
         #[cfg(unix)]
         if file.executable {
             use std::os::unix::fs::PermissionsExt;
-            let all = std::fs::Permissions::from_mode(0o755);
-            std::fs::set_permissions(&path, all).map_err(|e| Error::output(&path, e))?;
+            let read = path.metadata().map_err(|e| Error::output(&path, e))?.permissions().mode();
+            // By whom it may be read.
+            let run = std::fs::Permissions::from_mode(read | (read & 0o444) >> 2);
+            std::fs::set_permissions(&path, run).map_err(|e| Error::output(&path, e))?;
         }
     }
     let shown = |before: &str, name: &str| shell(&format!("{before}{}{name}", bundle.display()));

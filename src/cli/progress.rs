@@ -37,6 +37,13 @@ struct State {
 }
 
 impl Teller {
+    /// Tells those who read a protocol that has a word for it what fails: one line of `message`.
+    pub fn fails(&self, message: &str) {
+        if matches!(self.style, Style::OpenJd) {
+            say(&format!("openjd_fail: {}\n", message.lines().next().unwrap_or_default()));
+        }
+    }
+
     /// Bars on a terminal, lines elsewhere, unless a style is named.
     pub fn new(style: ProgressStyle) -> Teller {
         let terminal = std::io::stderr().is_terminal();
@@ -255,11 +262,7 @@ impl Watcher for Teller {
                 let turn = self.state.lock().unwrap_or_else(PoisonError::into_inner).turn;
                 match &report.status {
                     Status::Done | Status::Skipped => say(&openjd(turn, 1.0)),
-                    // One line, whatever the message is.
-                    Status::Failed { message, .. } => {
-                        let message = message.lines().next().unwrap_or_default();
-                        say(&format!("openjd_fail: {}: {message}\n", report.label()));
-                    }
+                    Status::Failed { message, .. } => self.fails(&format!("{}: {message}", report.label())),
                 }
             }
             Style::Quiet => {}

@@ -41,7 +41,8 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     if let Some(file) = &arguments.report {
         prepare_place(file)?;
     }
-    let mut report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)?;
+    let mut report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)
+        .inspect_err(|fault| teller.fails(&fault.to_string()))?;
     teller.finish();
     if let Some(gone) = overrides.keep.viewer.as_ref().and_then(|viewer| viewer.close()) {
         super::complain(&format!("warning: {gone}"));

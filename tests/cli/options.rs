@@ -27,6 +27,10 @@ fn progress_is_lines_json_or_nothing() {
     assert_eq!(events[0], serde_json::json!({"event": "scene", "scene": "good", "index": 0, "count": 1}));
     assert_eq!(events.last().unwrap()["event"], "done");
     assert_eq!(run("none").err, "");
+    // Open Job Description hears of what fails before the first picture, too.
+    let ran = place.run(&["render", "scenes/none.yaml", "--progress", "openjd"]);
+    assert!(ran.out.starts_with("openjd_fail: ") && ran.out.contains("none.yaml"), "{}", ran.out);
+    assert_eq!((ran.out.lines().count(), ran.code), (1, 3));
 }
 
 #[test]

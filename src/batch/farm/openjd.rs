@@ -41,11 +41,11 @@ pub fn files(job: &Job) -> Result<Vec<BundleFile>> {
         "referencedPaths": [],
     }});
     let file = |name, text| BundleFile { name, text, executable: false };
-    // JSON is YAML.
+    // JSON is YAML but for some letters.
     Ok(vec![
         file("template.yaml", template(job)),
-        file("parameter_values.yaml", format!("{values:#}\n")),
-        file("asset_references.yaml", format!("{assets:#}\n")),
+        file("parameter_values.yaml", escaped(&format!("{values:#}\n"))),
+        file("asset_references.yaml", escaped(&format!("{assets:#}\n"))),
         file("parameters.json", format!("{:#}\n", json!({"Batch": source, "OutputDir": pictures}))),
     ])
 }
@@ -110,7 +110,21 @@ fn frames_of(group: &Group) -> String {
 
 /// A text as YAML writes it in quotes.
 fn quoted(text: &str) -> String {
-    json!(text).to_string()
+    escaped(&json!(text).to_string())
+}
+
+/// `json` with what YAML does not take as it is, or breaks lines at, by numbers: it stands in quotes alone.
+fn escaped(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        match c {
+            '\u{7f}'..='\u{9f}' | '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' => {
+                let _ = write!(out, "\\u{:04x}", u32::from(c));
+            }
+            _ => out.push(c),
+        }
+    }
+    out
 }
 
 fn list<T: AsRef<str>>(items: impl IntoIterator<Item = T>) -> String {
@@ -281,6 +295,15 @@ mod tests {
         assert!(parts.contains("\"--set\", \"render.seed='x y'\"]\n"));
         let files = files(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).unwrap();
         assert!(files[1].text.contains("/in/it's.yaml"));
+    }
+
+    /// YAML breaks lines at some letters, and takes others by their number alone; the rest stays as it is.
+    #[test]
+    fn letters_that_yaml_does_not_take_are_written_by_their_numbers() {
+        let name = "a \u{2028} b\u{2029}\u{7f}\u{85}\u{feff}\u{ffff} é\u{1f600}\"";
+        let written = quoted(name);
+        assert_eq!(written, "\"a \\u2028 b\\u2029\\u007f\\u0085\\ufeff\\uffff é\u{1f600}\\\"\"");
+        assert_eq!(serde_json::from_str::<String>(&written).unwrap(), name);
     }
 
     /// `openjd check` refused what was written. Of 50 parameters a job with frames has 6 of its own.

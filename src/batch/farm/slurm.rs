@@ -136,21 +136,28 @@ fn render(job: &Job) -> String {
              # The process ends by itself before the kernel kills it.\n\
              memory=${{SLURM_MEM_PER_NODE:-$((${{SLURM_MEM_PER_CPU:-0}} * ${{SLURM_CPUS_ON_NODE:-1}}))}}\n\
              ((memory == 0)) || what+=(--memory-limit \"${{memory}}M\")\n\
-             restarts=${{SLURM_RESTART_COUNT:-0}}\n\
-             echo \"task $number: $line: on ${{SLURMD_NODENAME:-?}}, begun again $restarts times\"\n\
-             {command}\n\
-             code=$?\n\
-             # 75: stopped, and kept in a checkpoint; 137: killed. Both go on elsewhere, but not for ever.\n\
-             if [[ $code == 75 || $code == 137 ]]; then\n    \
-                 if ((restarts >= {RESTARTS})); then\n        \
-                     echo \"given up after $restarts restarts\" >&2\n        \
-                     exit {GIVEN_UP}\n    \
-                 fi\n    \
-                 # It ends this script, too.\n    \
-                 scontrol requeue \"$SLURM_JOB_ID\" && sleep 60\n\
-             fi\n\
-             exit $code\n"
+             echo \"task $number: $line: on ${{SLURMD_NODENAME:-?}}, begun again ${{SLURM_RESTART_COUNT:-0}} times\"\n\
+             {command}\n"
         )
+        + &ends()
+}
+
+/// What both scripts do with the exit code of their command.
+fn ends() -> String {
+    format!(
+        "code=$?\n\
+         # 75: stopped, and kept in a checkpoint; 137: killed. Both go on elsewhere, but not for ever.\n\
+         restarts=${{SLURM_RESTART_COUNT:-0}}\n\
+         if [[ $code == 75 || $code == 137 ]]; then\n    \
+             if ((restarts >= {RESTARTS})); then\n        \
+                 echo \"given up after $restarts restarts\" >&2\n        \
+                 exit {GIVEN_UP}\n    \
+             fi\n    \
+             # It ends this script, too.\n    \
+             scontrol requeue \"$SLURM_JOB_ID\" && sleep 60\n\
+         fi\n\
+         exit $code\n"
+    )
 }
 
 fn merge(job: &Job) -> String {
@@ -161,6 +168,7 @@ fn merge(job: &Job) -> String {
            [ \"$frame\" = - ] || place=\"$place/$frame\"\n\
            # 3: a part is missing, damaged or of another picture.\n\
            srun --ntasks=1 \"$abbe\" merge \"$place\" -o \"$pictures\"\n"
+        + &ends()
 }
 
 /// Sends the tasks off as arrays of what Slurm takes at the most; the number of the first of each is told to its script.
@@ -169,6 +177,8 @@ fn submit(job: &Job, tasks: usize, pictures: usize) -> String {
         "#!/bin/bash\n\
          # submit.sh [options of sbatch, as -p spot --mem=4G --cpus-per-task=8]: {} pictures in {tasks} tasks\n\
          set -euo pipefail\n\
+         # By CDPATH cd would look elsewhere first.\n\
+         unset CDPATH\n\
          cd \"$(dirname \"${{BASH_SOURCE[0]}}\")\"\n\
          mkdir -p log\n\
          most=$({{ scontrol show config || true; }} | sed -n 's/^MaxArraySize *= *\\([1-9][0-9]*\\).*/\\1/p')\n\
@@ -196,7 +206,7 @@ fn submit(job: &Job, tasks: usize, pictures: usize) -> String {
     if job.cut.parts() {
         let _ = write!(
             out,
-            "merge=$(submit merge.sbatch {pictures} -d afterany:\"$render\" \"$@\")\n\
+            "merge=$(submit merge.sbatch {pictures} \"$@\" -d afterany:\"$render\")\n\
              echo \"merge: job $merge\"\n"
         );
     }
@@ -232,6 +242,10 @@ mod tests {
         // Ranges of samples are named where there are several: adaptive sampling knows none.
         let tiles = render(&job(Cut { tiles: 2, ranges: 1, frames: 1 }));
         assert!(tiles.contains("what+=(--tile \"$tile\")\n") && !tiles.contains("--samples"), "{tiles}");
+        // What is killed goes on elsewhere, be it a part or what merges them.
+        for script in [tiles, merge(&job(Cut { tiles: 2, ranges: 1, frames: 1 }))] {
+            assert!(script.contains("$code == 137") && script.contains("scontrol requeue"), "{script}");
+        }
         // A name may begin like an option.
         assert!(render(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).contains(" --scene=\"$scene\" "));
         assert_eq!(word("it's"), "'it'\\''s'");
@@ -278,8 +292,8 @@ mod tests {
             "--parsable --array=0-3 -p two words render.sbatch 0\n\
              --parsable --array=0-3 -p two words render.sbatch 4\n\
              --parsable --array=0-1 -p two words render.sbatch 8\n\
-             --parsable --array=0-3 -d afterany:10:11:12 -p two words merge.sbatch 0\n\
-             --parsable --array=0-2 -d afterany:10:11:12 -p two words merge.sbatch 4\n"
+             --parsable --array=0-3 -p two words -d afterany:10:11:12 merge.sbatch 0\n\
+             --parsable --array=0-2 -p two words -d afterany:10:11:12 merge.sbatch 4\n"
         );
         assert_eq!(out, "render: job 10:11:12\nmerge: job 13:14\n");
         let (succeeded, calls, ..) = submit("#!/bin/bash\nexit 1\n", "");
@@ -287,6 +301,20 @@ mod tests {
         let (succeeded, calls, out, err) = submit("#!/bin/bash\necho 'MaxArraySize = 4'\n", "3");
         assert!(!succeeded && calls.lines().count() == 3 && out.is_empty(), "{calls}{out}");
         assert_eq!(err, "already submitted: scancel 10 11\n");
+        // Called by a relative name, it stays where it is, whatever CDPATH says.
+        let (parent, name) = (place.path().parent().unwrap(), place.path().file_name().unwrap());
+        let elsewhere = tempfile::tempdir().unwrap();
+        std::fs::create_dir(elsewhere.path().join(name)).unwrap();
+        let path = format!("{}:{}", place.path().display(), std::env::var("PATH").unwrap());
+        let done = std::process::Command::new("bash")
+            .arg(std::path::Path::new(name).join("submit.sh"))
+            .current_dir(parent)
+            .env("PATH", path)
+            .env("CDPATH", elsewhere.path())
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(!elsewhere.path().join(name).join("log").exists());
     }
 
     /// Within `${…:-…}` an apostrophe began a text that did not end, and a brace ended the path.
