@@ -2,7 +2,6 @@
 
 use super::common::{Bench, bench_with, grey_png, room};
 use super::reuse::{assert_layers_add_up, assert_same_light, over_seeds};
-use abbe::math::statistics::Moments;
 
 const LAMP: &str = "- rectangle: {corner: [-0.3, 0.9, -0.3], edge_u: [0.6, 0, 0], edge_v: [0, 0, 0.6], emission: 3}\n";
 
