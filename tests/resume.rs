@@ -571,11 +571,11 @@ fn signals_that_come_together_are_one() {
 fn a_finished_picture_needs_no_room_to_be_found() {
     let place = Place::of(&scene("off").replace("samples: 64", "samples: 4"));
     assert_eq!(run(&place, "o/a.exr", &[]).code, 0);
+    let rendered = place.json("o/report.json")["scenes"][0].take();
     // As long as this stands there no checkpoint can be written.
     std::fs::create_dir(place.path("o/a.exr.checkpoint")).unwrap();
     let ran = run(&place, "o/a.exr", &[]);
     assert!(ran.code == 1 && ran.err.contains("a.exr.checkpoint"), "{} {}", ran.code, ran.err);
-    let rendered = place.json("o/report.json")["scenes"][0].take();
     assert_eq!(run(&place, "o/a.exr", &["--skip-existing"]).code, 0);
     let skipped = place.json("o/report.json")["scenes"][0].take();
     assert_eq!(skipped["status"], "skipped");
