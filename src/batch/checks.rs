@@ -57,8 +57,8 @@ pub(super) fn before_work(name: &str, description: &SceneDescription, overrides:
 /// The place that `option` gives for `scenes` scenes.
 ///
 /// # Errors
-/// [`Error::Config`] for the standard output, for the name of another kind of file, for a word in braces that stands for nothing, and for one file for
-/// all scenes.
+/// [`Error::Config`] for the standard output, for the name of another kind of file, for a word in braces that stands for nothing, and
+/// for one file for all scenes.
 pub(super) fn output_place(option: &str, output: Option<&Path>, scenes: usize) -> Result<()> {
     if output == Some(Path::new("-")) {
         let message = "expected a directory or a file name, for a picture is several files; found the standard output";
